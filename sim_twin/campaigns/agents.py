@@ -101,7 +101,7 @@ def play(name: str, calls: int) -> CampaignCase:
     kind, _, seed = name.partition("/")
     clock = MonotonicClock()
     begun_ns = clock.now_ns()
-    with _attacked(int(seed)) as attack:
+    with attacked(int(seed)) as attack:
         anyio.run(attack.play, calls, kind == "leased")
         failures, figures = tuple(dict.fromkeys(attack.failures)), attack.figures
     seconds = (clock.now_ns() - begun_ns) / NS_PER_S
@@ -109,7 +109,8 @@ def play(name: str, calls: int) -> CampaignCase:
 
 
 @contextmanager
-def _attacked(seed: int) -> Iterator["Attack"]:
+def attacked(seed: int) -> Iterator["Attack"]:
+    """Give an armed robot on the twin, and who attacks it."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         base = Path(folder) / "base"
         run_dir = base / "run"
@@ -130,7 +131,7 @@ class Attack:
         self.figures: dict[str, int | float] = {"calls": 0, "refused": 0, "plans": 0}
         self._stack = stack
         self._draw = draw
-        self._lease = LeaseKeeper(stack.space, stack.clock)
+        self.lease = LeaseKeeper(stack.space, stack.clock)
         self._audit = AuditFile(base / "audit.jsonl")
         self._plans = stack.link.events(topics.PLAN)
         self._table: Any = stack.space.cell_writer(topics.PROCESS_TABLE)
@@ -150,7 +151,7 @@ class Attack:
         before = self._stack.lockstep.truth()
         for number in range(calls):
             if is_leased and number % (20 * _LOOK_EVERY) == 0:
-                self._lease.grant(_PERSON, LONGEST_MINUTES)
+                self.lease.grant(_PERSON, LONGEST_MINUTES)
             self._table.put_document({"robot": "butler"})
             await self._attack()
             if number % _LOOK_EVERY:
@@ -158,7 +159,7 @@ class Attack:
             self._look(before, is_leased)
             if is_leased:
                 self._be_a_person()
-        self._lease.revoke(_PERSON)
+        self.lease.revoke(_PERSON)
         self._stack.pause(REST_WITHIN_S)
         self._look(before, is_leased)
         name, speed_rad_s = fastest_joint(self._stack.lockstep.truth())

@@ -4,26 +4,16 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import NS_PER_S
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.client.agent_lease import LeaseKeeper, LeaseRule, is_agent, judge_lease, sender_of
 from vla_deploy.ipc import SharedSpace
 
 MINUTE_NS = 60 * NS_PER_S
 
 
-class ManualClock:
-    def __init__(self) -> None:
-        self.time_ns = 100 * MINUTE_NS
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
-
 @pytest.fixture
 def clock() -> ManualClock:
-    return ManualClock()
+    return ManualClock(100 * MINUTE_NS)
 
 
 @pytest.fixture
@@ -73,11 +63,11 @@ def test_a_lease_is_granted_shown_and_taken_back(space, clock):
     assert other.state().rule is LeaseRule.NOT_LEASED
     assert other.revoke("cli:anna").rule is LeaseRule.NOT_LEASED
     desk.grant("cli:anna", 10)
-    clock.time_ns += 4 * MINUTE_NS
+    clock.ns += 4 * MINUTE_NS
     assert (other.state().left_s, other.state().granted_by) == (360.0, "cli:anna")
     assert other.revoke("cli:ben").rule is LeaseRule.REVOKED
     desk.grant("cli:anna", 1)
-    clock.time_ns += MINUTE_NS
+    clock.ns += MINUTE_NS
     assert other.state().rule is LeaseRule.EXPIRED
 
 

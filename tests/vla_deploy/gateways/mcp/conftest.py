@@ -11,6 +11,7 @@ import anyio
 import pytest
 
 from drivers.clock import NS_PER_S
+from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.client.access.audit_log import AuditFile, AuditLog
 from vla_deploy.client.agent_lease import LeaseKeeper
 from vla_deploy.gateways.mcp.acting import RobotActs
@@ -32,22 +33,11 @@ def butler() -> RobotDescription:
     return load_robot("butler")
 
 
-class StepClock:
-    def __init__(self) -> None:
-        self.time_ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
-
 class LeasedRobot:
     """Run the planner while an agent waits; every plan that it dispatches succeeds at once."""
 
     def __init__(self, folder: Path) -> None:
-        self.clock = StepClock()
+        self.clock = ManualClock(NS_PER_S)
         self.base = folder / "base"
         self.run_dir = self.base / "run"
         self.run_dir.mkdir(parents=True)
@@ -110,7 +100,7 @@ class LeasedRobot:
 
     def step(self) -> None:
         """Pass a moment."""
-        self.clock.time_ns += NS_PER_S // 20
+        self.clock.ns += NS_PER_S // 20
         self._publish()
         self.planner.step()
         for event in self._plans.drain():
