@@ -252,10 +252,11 @@ class PlannerNode:
 
     def _end_unleased(self) -> None:
         """End what agents asked for, once they may ask for nothing more."""
-        carried_out = self._manager.carried_out
-        for command_id in self._agents.take_ended(self._manager.in_work | carried_out):
-            self._manager.drop(command_id)
-            if command_id not in carried_out:
+        manager = self._manager
+        for command_id in self._agents.take_ended(lambda: manager.in_work | manager.carried_out):
+            is_carried_out = command_id in manager.carried_out
+            manager.drop(command_id)
+            if not is_carried_out:
                 self._refuse(command_id, LEASE_ENDED)
 
     def _note(self, event: Event[TaskEvent]) -> None:

@@ -43,8 +43,8 @@ class RobotReader:
         self._planner_of = lru_cache(maxsize=1)(self._open_planner)
 
     def state(self) -> dict[str, Any]:
-        """Return the status of every process, and how the lease stands."""
-        return {**collect(self._access.link()), "lease": self._access.lease().document()}
+        """Return the status of every process and of the lease, without the things around."""
+        return collect(self._access.link()) | {"scene": "see the tool scene"}
 
     def scene(self, words: str) -> dict[str, Any]:
         """Return what is known of things.

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from drivers.clock import Clock
-from vla_deploy.client.agent_lease import AGENT, LeaseKeeper, LeaseState
+from vla_deploy.client.agent_lease import AGENT, LeaseState, judge_lease
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.mcp.errors import NoRobot
+from vla_deploy.ipc import topics
 from vla_deploy.supervisor.runs.runtime import running
 
 
@@ -19,7 +20,6 @@ class RobotAccess:
         self.base = base
         self._clock = clock
         self._link: RobotLink | None = None
-        self._leases: LeaseKeeper | None = None
 
     def link(self) -> RobotLink:
         """Return the link to the run of now.
@@ -34,7 +34,6 @@ class RobotAccess:
         if self._link is None or self._link.run_dir != run_dir:
             self.close()
             self._link = RobotLink(run_dir, self._clock, source=AGENT)
-            self._leases = LeaseKeeper(self._link.space, self._link.clock)
         return self._link
 
     def lease(self) -> LeaseState:
@@ -44,11 +43,10 @@ class RobotAccess:
             NoRobot: none runs.
         """
         link = self.link()
-        assert self._leases is not None and link is self._link
-        return self._leases.state()
+        return judge_lease(link.document(topics.AGENT_LEASE), link.clock.now_ns())
 
     def close(self) -> None:
         """Let go of the run."""
         if self._link is not None:
             self._link.close()
-        self._link = self._leases = None
+        self._link = None

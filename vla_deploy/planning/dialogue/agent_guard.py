@@ -126,13 +126,13 @@ class AgentGuard:
             raise refused
         self._given.add(command_id_of(event))
 
-    def take_ended(self, in_work: Collection[str]) -> tuple[str, ...]:
+    def take_ended(self, in_work: Callable[[], Collection[str]]) -> tuple[str, ...]:
         """Return the agents' commands in work whose lease has ended, each once."""
         if len(self._given) > _MOST_REMEMBERED:
-            self._given.intersection_update(in_work)
+            self._given.intersection_update(in_work())
         if not self._given or self._leases.state().is_live:
             return ()
-        ended = self._given.intersection(in_work)
+        ended = self._given.intersection(in_work())
         self._given.clear()
         return tuple(sorted(ended))
 
