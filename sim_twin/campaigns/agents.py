@@ -190,7 +190,7 @@ class Attack:
         given = {key: self._value(key) for key in takes if self._draw.random() < 0.9}
         if "wait_s" in given:
             sane = self._draw.random() < _SANE_SHARE
-            given["wait_s"] = self._draw.choice((0.0, 0.1, 0.5) if sane else _NUMBERS)
+            given["wait_s"] = self._draw.choice((0.5, 0.5, 1) if sane else _NUMBERS)
         answer = await self._calls.call(name, given, AgentName(client=self._draw.choice(_NAMES)))
         json.dumps(answer.document())
         self.figures["refused"] += answer.is_error

@@ -62,13 +62,11 @@ class RobotActs:
         )
         told: list[TaskEvent] = []
         until_ns = link.clock.now_ns() + round(wait_s * NS_PER_S)
-        while not _is_over(following, told):
+        while not (_is_over(following, told) or link.clock.now_ns() >= until_ns):
+            await self._pause()
             told += following.look(events)
-            if _is_over(following, told) or link.clock.now_ns() >= until_ns:
-                break
             if following.is_unanswered:
                 raise NoRobot("planner and executor do not answer; nothing is carried out")
-            await self._pause()
         events.close()
         return {"command_id": command_id, **_standing(told), "events": [*told]}
 

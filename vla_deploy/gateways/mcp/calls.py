@@ -41,6 +41,8 @@ _FAULTS: Final = (
 )  # fmt: skip
 """What a person may have to mend: their words are for the agent, too."""
 _REFUSED_STATES: Final = {"rejected": "robot_refused", "asked": "person_answers"}
+_AT_ONCE: Final = {ToolKind.READ: 1, ToolKind.STOP: 8, ToolKind.ACT: 4}
+"""So many calls of one kind go on at a time: none pushes what a person says out of the ring."""
 _FOLDED_S: Final = {ToolKind.READ: FOLD_S, ToolKind.STOP: STOP_FOLD_S, ToolKind.ACT: 0.0}
 """Within this time the calls of one kind are one entry of the audit log, with their count."""
 _log = logging.getLogger(__name__)
@@ -94,7 +96,7 @@ class AgentCalls:
         self._acts = acts
         self._reader = reader
         self._audit = audit
-        self._reads = anyio.CapacityLimiter(1)
+        self._turns = {kind: anyio.CapacityLimiter(most) for kind, most in _AT_ONCE.items()}
 
     def may_act(self) -> bool:
         """Return whether tools that act may be used now."""
@@ -138,9 +140,11 @@ class AgentCalls:
         if tool.kind is ToolKind.READ:
             read = getattr(self._reader, name)
             values = given.model_dump().values()
-            data = await anyio.to_thread.run_sync(lambda: read(*values), limiter=self._reads)
+            turn = self._turns[tool.kind]
+            data = await anyio.to_thread.run_sync(lambda: read(*values), limiter=turn)
             return ToolAnswer(rule=tool.kind, outcome=AuditOutcome.DONE, data=data)
-        data = await self._act(name, given, who.sender)
+        async with self._turns[tool.kind]:
+            data = await self._act(name, given, who.sender)
         is_refused = data["state"] == "rejected"
         rule = _REFUSED_STATES.get(data["state"], tool.kind.value)
         if is_refused:

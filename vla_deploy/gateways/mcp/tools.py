@@ -12,6 +12,7 @@ from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.gateways.words import MOST_BYTES, checked_text
 from vla_deploy.ipc.payloads.tasks import UtteranceContent
 
+SHORTEST_WAIT_S: Final = 0.5
 LONGEST_WAIT_S: Final = 60.0
 
 
@@ -85,7 +86,7 @@ class EstopArguments(NoArguments):
 class ActArguments(NoArguments):
     """Say how long the end of a command is waited for; the command goes on after that."""
 
-    wait_s: Annotated[float, Field(ge=0.0, le=LONGEST_WAIT_S)] = 30.0
+    wait_s: Annotated[float, Field(ge=SHORTEST_WAIT_S, le=LONGEST_WAIT_S)] = 30.0
 
     def content(self) -> UtteranceContent:
         """Return what is said to the planner."""

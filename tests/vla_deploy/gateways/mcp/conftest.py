@@ -46,6 +46,7 @@ class LeasedRobot:
         self.space = SharedSpace(self.run_dir / "ipc", self.clock)
         self.lease = LeaseKeeper(self.space, self.clock)
         self.plans: list[dict[str, Any]] = []
+        self.after_step: Callable[[], object] = lambda: None
         self._plans = self.space.ring_reader("plan", from_start=True)
         self._told = self.space.ring_writer("task_event")
         self._said = self.space.ring_writer("utterance")
@@ -103,6 +104,7 @@ class LeasedRobot:
         self.clock.ns += NS_PER_S // 20
         self._publish()
         self.planner.step()
+        self.after_step()
         for event in self._plans.drain():
             self.plans.append(event.payload)
             done = {"command_id": event.payload["command_id"], "event": "finished"}

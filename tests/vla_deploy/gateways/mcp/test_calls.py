@@ -2,6 +2,7 @@
 
 import json
 
+import anyio
 import pytest
 
 from vla_deploy.gateways.mcp.calls import AgentName
@@ -101,6 +102,20 @@ def test_a_flood_of_reads_is_one_entry_of_the_audit_log(robot):
     for _ in range(50):
         robot.call("memory")
     assert len(robot.audited()) == 1
+
+
+def test_a_flood_of_stops_pushes_nothing_out_of_the_ring(robot):
+    heard = robot.space.ring_reader("utterance", from_start=True)
+
+    async def flood() -> None:
+        async with anyio.create_task_group() as tasks:
+            for _ in range(60):
+                tasks.start_soon(robot.calls.call, "stop", {}, AgentName(client="flood"))
+
+    robot.after_step = heard.drain
+    anyio.run(flood)
+    assert len(robot.plans) == 60
+    assert heard.lost == 0
 
 
 @pytest.mark.parametrize("client", ["", "x" * 5000, "\x1b]0;root\x07", "cli:anna", "page"])
