@@ -1,6 +1,5 @@
 """Answer what agents ask about the robot and its world; nothing moves by it."""
 
-import contextlib
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -91,12 +90,11 @@ class RobotReader:
 
     def commands(self, command_id: str, limit: int) -> list[dict[str, Any]]:
         """Return one command with its newest events, or the newest ones without."""
-        with contextlib.closing(_History(self._access.link())) as history:
-            if not command_id:
-                return [
-                    {**one.document(), "events": len(one.events)} for one in history.newest(limit)
-                ]
-            found = history.find(command_id)
+        history = CommandHistory(self._access.link(), time.time_ns)
+        newest, found = history.newest(limit), history.find(command_id)
+        history.stop()
+        if not command_id:
+            return [{**one.document(), "events": len(one.events)} for one in newest]
         if found is None:
             return []
         document = found.document()
@@ -113,14 +111,3 @@ class RobotReader:
 
     def _shipped(self, robot: RobotDescription, profile: str) -> Planner:
         return planner_for(robot, load_profile(profile), MonotonicClock(), self._access.base)
-
-
-class _History(CommandHistory):
-    """Read what the rings hold now."""
-
-    def __init__(self, link: RobotLink) -> None:
-        super().__init__(link, time.time_ns)
-
-    def close(self) -> None:
-        """Forget the rings."""
-        self.stop()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import anyio
+import anyio.lowlevel
 import pytest
 
 from drivers.clock import NS_PER_S
@@ -121,6 +122,7 @@ class LeasedRobot:
         self.space.close()
 
     async def _pause(self) -> None:
+        await anyio.lowlevel.checkpoint()  # others may call meanwhile
         self.step()
 
 
