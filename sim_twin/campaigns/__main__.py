@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import demos, load, missions, navigation, soak
+from sim_twin.campaigns import agents, demos, load, missions, navigation, soak
 from sim_twin.campaigns.cutting import power_cuts
 from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
@@ -21,6 +21,7 @@ from vla_deploy.cli.commands import OneLineParser, number_above_zero, whole_numb
 CAMPAIGNS: Final[
     Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], CampaignReport]]
 ] = {
+    "agents": agents.run,
     "demos": demos.run,
     "faults": fault_matrix.run,
     "kills": kills.run,
