@@ -7,12 +7,10 @@ PlanError             of vla_deploy.plans.errors, with what is wrong with a plan
 │   └── NotAble       nor can any other planner: the robot lacks what it takes, or it is not there
 ├── Declined          ask the next back end: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
-├── NotReadyToMove    reset and arm the robot first
-│   └── BatteryLow    let it charge
-└── AgentRefused      let a person grant a lease, or do it: an agent asked
+└── NotReadyToMove    reset and arm the robot first
+    └── BatteryLow    let it charge
 """
 
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -44,9 +42,6 @@ def _examples(world: "World | None") -> Sequence[str]:
         return _DRIVING
     poses = [f"go to the {min(world.poses).replace('_', ' ')} pose"] if world.poses else []
     return [*(said for skill, said in _MOUNTED if skill in world.skills), *poses]
-
-
-_RULE: Final = re.compile(r"agents may not: .* \(rule (?P<rule>\w+)\)", re.DOTALL)
 
 
 class CommandUnreadable(PlanError):
@@ -94,17 +89,3 @@ class NotReadyToMove(PlanError):
 
 class BatteryLow(NotReadyToMove):
     """Say that the battery is too low for a plan."""
-
-
-class AgentRefused(PlanError):
-    """Say which rule keeps an agent from what it asked for, and what a person can do."""
-
-    def __init__(self, rule: str, why: str) -> None:
-        self.rule = rule
-        super().__init__(f"agents may not: {why} (rule {rule})")
-
-    @staticmethod
-    def rule_of(reason: str) -> str:
-        """Return the rule that a refusal's reason names, "" where it names none."""
-        found = _RULE.fullmatch(reason)
-        return found["rule"] if found else ""

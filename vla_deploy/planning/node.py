@@ -23,7 +23,7 @@ from vla_deploy.memory.keeper import MemoryKeeper
 from vla_deploy.missions.store import MissionStore
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.active_plans import RESTARTED
-from vla_deploy.planning.dialogue.agent_guard import LEASE_ENDED, AgentGuard, of_agent
+from vla_deploy.planning.dialogue.agent_guard import AgentGuard
 from vla_deploy.planning.dialogue.battery_watch import BatteryWatch
 from vla_deploy.planning.dialogue.command import (
     UserCommand,
@@ -38,6 +38,7 @@ from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import NotReadyToMove
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions
+from vla_deploy.plans.agent_rules import LEASE_ENDED, of_agent
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread

@@ -8,7 +8,7 @@ import pytest
 
 from vla_deploy.client.access.audit_log import AuditFile, AuditLog
 from vla_deploy.client.agent_lease import LeaseKeeper
-from vla_deploy.planning.dialogue.agent_guard import LEASE_ENDED
+from vla_deploy.plans.agent_rules import LEASE_ENDED
 
 AGENT = "agent:tester"
 GO = "go to the kitchen"

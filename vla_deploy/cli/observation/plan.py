@@ -12,10 +12,10 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.operation.say import EXIT_ASKED, read_json
 from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
 from vla_deploy.client.action_words import action_words
+from vla_deploy.gateways.plan_preview import PlanPreview, preview, preview_request
 from vla_deploy.ipc import topics
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.interfaces import Attempt, PlanRequest
-from vla_deploy.planning.preview import PlanPreview, preview, preview_request
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.world import Snapshot, read_snapshot
 from vla_deploy.world.document import read_report

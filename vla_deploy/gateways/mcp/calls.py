@@ -27,7 +27,7 @@ from vla_deploy.gateways.mcp.tools import TOOLS, ActArguments, AgentTool, NoArgu
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.ipc.errors import IpcError
 from vla_deploy.memory.errors import RecollectionError
-from vla_deploy.planning.errors import AgentRefused
+from vla_deploy.plans.agent_rules import AgentRefused
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.robots.errors import RobotError
 from vla_deploy.supervisor.errors import SupervisorError

@@ -12,11 +12,11 @@ from vla_deploy.client.command_history import CommandHistory
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.mcp.errors import NoRobot
 from vla_deploy.gateways.mcp.robot_access import RobotAccess
+from vla_deploy.gateways.plan_preview import preview, preview_request
 from vla_deploy.ipc import topics
 from vla_deploy.memory import MemoryStore
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.planner import Planner
-from vla_deploy.planning.preview import preview, preview_request
 from vla_deploy.plans.scene_report import scene_report
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.telemetry.folder import FlightFolder, folder_of

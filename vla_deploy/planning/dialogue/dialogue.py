@@ -12,7 +12,6 @@ from typing import Any, Final
 from drivers.clock import Clock
 from vla_deploy.ipc.payloads.tasks import PlannerCounts
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
-from vla_deploy.planning.dialogue.agent_guard import NO_ORDERS
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import (
     agreement_to,
@@ -35,6 +34,7 @@ from vla_deploy.planning.understanding import (
     judge_answer,
 )
 from vla_deploy.planning.understanding.conversation import ANSWER_LIMIT_S, mentions_of
+from vla_deploy.plans.agent_rules import NO_ORDERS
 from vla_deploy.plans.errors import PlanError, PlanInvalid
 from vla_deploy.plans.plan import Plan
 
