@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -13,10 +14,15 @@ from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
 from sim_twin.campaigns.orderly_end import end_on_sigterm
 from sim_twin.campaigns.pressing import pressure
-from sim_twin.campaigns.report import CampaignReport, NoRoom, make_room
-from sim_twin.campaigns.selection import NothingChosen
+from sim_twin.campaigns.report import CampaignReport, make_room
+from sim_twin.campaigns.selection import OptionRefused
+from sim_twin.campaigns.suites import suite
+from sim_twin.campaigns.suites.page import write_page
+from sim_twin.campaigns.suites.ray_tasks import LOCAL
+from sim_twin.campaigns.suites.report import SuiteReport
 from sim_twin.campaigns.switching import switches
 from vla_deploy.cli.commands import OneLineParser, number_above_zero, whole_number
+from vla_deploy.cli.maintenance.measure import SUITES
 
 CAMPAIGNS: Final[
     Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], CampaignReport]]
@@ -32,24 +38,30 @@ CAMPAIGNS: Final[
     "pressure": pressure.run,
     "switches": switches.run,
     "soak": soak.run,
+    "suite": suite.run,
 }
 _EXAMPLES: Final = """examples:
   vla-deploy validate faults --junit out/faults.xml
   vla-deploy validate faults --only servo_bus --json
   vla-deploy validate kills --count 20
-  vla-deploy validate demos --robot so101"""
+  vla-deploy validate demos --robot so101
+  vla-deploy validate suite safety --count 1 --html out/safety.html"""
 _EXIT_INTERRUPTED: Final = 130
+_WORKERS: Final = 2
+_FILES: Final = ("junit", "html")
+_OF_SUITES: Final = ("suite", "html", "compare", "ray")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run it; exit code 0 only where no case failed, 2 where the options cannot be met."""
-    options = _parser().parse_args(argv)
+    options = _options(argv)
     progress = _to_stderr if options.json else _to_stdout
     try:
-        if options.junit is not None:
-            make_room(options.junit)
+        for option in _FILES:
+            if (path := getattr(options, option)) is not None:
+                make_room(f"--{option}", path)
         report = CAMPAIGNS[options.campaign](options, progress)
-    except (NothingChosen, NoRoom) as error:
+    except OptionRefused as error:
         _to_stderr(f"validate {options.campaign}: {error}")
         return 2
     except KeyboardInterrupt:
@@ -57,7 +69,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     _to_stdout(json.dumps(report.document(), indent=2) if options.json else report.text())
     if options.junit is not None:
         report.write_junit(options.junit)
-    return 1 if report.failed else 0
+    if options.html is not None and isinstance(report, SuiteReport):
+        write_page(report, options.html)
+    return 0 if report.passed else 1
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Return the options; those of the suites belong to no other campaign."""
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.campaign != "suite":
+        for option in _OF_SUITES:
+            if getattr(options, option) is not None:
+                name = "a suite's name" if option == "suite" else f"--{option}"
+                parser.error(f"{name} is of `validate suite`, not of `validate {options.campaign}`")
+    if options.workers is None:
+        options.workers = (os.cpu_count() or 1) if options.campaign == "suite" else _WORKERS
+    return options
 
 
 def start(argv: Sequence[str] | None = None) -> int:
@@ -83,6 +111,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("campaign", choices=tuple(CAMPAIGNS))
+    parser.add_argument("suite", nargs="?", choices=tuple(SUITES), help="of suite (default: all)")
     parser.add_argument("--only", default="", help="play only cases whose name contains this")
     parser.add_argument("--count", type=whole_number(), help="how many injections or switches")
     parser.add_argument(
@@ -91,9 +120,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--robot", default="butler", help="of demos, faults, kills and load")
     parser.add_argument(
-        "--workers", type=whole_number(), default=2, help="how many cases at a time"
+        "--workers",
+        type=whole_number(),
+        help=f"how many cases at a time (default: {_WORKERS}; of suite: one a core)",
     )
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="of suite: write a page too")
+    parser.add_argument(
+        "--compare", type=Path, metavar="FILE", help="of suite: compare with what --json printed"
+    )
+    parser.add_argument(
+        "--ray", nargs="?", const=LOCAL, metavar="ADDRESS", help="of suite: play on a Ray cluster"
+    )
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     return parser
 

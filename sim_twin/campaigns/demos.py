@@ -23,7 +23,7 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     """Do the job of `options.robot` with `options.count` seeds, 10 unless given, as text."""
     count = COUNT if options.count is None else options.count
     seeds = range(options.seed, options.seed + count)
-    cases = [told(_case(seed, options.robot), tell) for seed in seeds]
+    cases = [told(play(seed, options.robot), tell) for seed in seeds]
     return CampaignReport(campaign="demos", cases=tuple(cases), summary=_summary(cases))
 
 
@@ -54,9 +54,10 @@ def faults_of(outcome: Outcome) -> list[str]:
     return faults + [f"{what}: {outcome[what]}, expected 0" for what in counted]
 
 
-def _case(seed: int, robot: str) -> CampaignCase:
+def play(seed: int, robot: str) -> CampaignCase:
+    """Do the job of a robot with a seed and judge it."""
     outcome = play_demo(seed, robot, "--typed", "--fast", "--headless")
-    names = ("took_s", "wall_s", "placement_error_m")
+    names = ("took_s", "wall_s", "placement_error_m", "pushes")
     return CampaignCase(
         name=f"{robot}/{seed}",
         failures=tuple(faults_of(outcome)),

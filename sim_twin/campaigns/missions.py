@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.campaigns.evidence import Watch, unwatched
 from sim_twin.campaigns.processes import played
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
@@ -96,24 +97,24 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     return CampaignReport(campaign="missions", cases=cases, summary=summary)
 
 
-def play(name: str, seed: int) -> CampaignCase:
+def play(name: str, seed: int, watch: Watch = unwatched) -> CampaignCase:
     """Play the case of that name; `seed` is that of the paused jobs."""
     kind, _, which = name.partition("/")
     clock = MonotonicClock()
     begun_ns = clock.now_ns()
     match kind:
         case "documents":
-            failures, figures = _documents(int(which))
+            failures, figures = _documents(int(which), watch)
         case "side_by_side":
-            failures, figures = _side_by_side(int(which))
+            failures, figures = _side_by_side(int(which), watch)
         case _:
-            failures, figures = _paused(which, seed)
+            failures, figures = _paused(which, seed, watch)
     seconds = (clock.now_ns() - begun_ns) / NS_PER_S
     return CampaignCase(name=name, failures=tuple(failures), figures=figures, seconds=seconds)
 
 
-def _documents(seed: int) -> _Played:
-    with _robot(seed) as stack:
+def _documents(seed: int, watch: Watch) -> _Played:
+    with _robot(seed, watch) as stack:
         on_table = _on(stack, TABLE) - {CUP}
         begun_s = stack.lockstep.now_s
         command_id = stack.give(text=DOCUMENTS)
@@ -152,10 +153,10 @@ def _on(stack: LockstepStack, furniture: str) -> set[str]:
     }
 
 
-def _side_by_side(seed: int) -> _Played:
+def _side_by_side(seed: int, watch: Watch) -> _Played:
     endings = []
     for objectives in (list(EIGHT), one_after_another()):
-        with _robot(seed) as stack:
+        with _robot(seed, watch) as stack:
             endings.append(_carried_out(stack, mission={"objectives": objectives}))
     beside, after = endings
     share = beside.took_s / after.took_s
@@ -172,11 +173,11 @@ def _side_by_side(seed: int) -> _Played:
     return failures, figures | {"apart_rad": apart_rad}
 
 
-def _paused(phase: str, seed: int) -> _Played:
-    with _robot(seed) as stack:
+def _paused(phase: str, seed: int, watch: Watch) -> _Played:
+    with _robot(seed, watch) as stack:
         plain = _carried_out(stack, text=MAIN_JOB)
         plain.inside = stack.lockstep.inside("red_cup", "box")
-    with _robot(seed) as stack:
+    with _robot(seed, watch) as stack:
         failures: list[str] = []
         command_id = stack.give(text=MAIN_JOB)
         begun_s = stack.lockstep.now_s
@@ -195,7 +196,8 @@ def _paused(phase: str, seed: int) -> _Played:
     if apart_m > MOST_APART_M:
         failures.append(f"placed {1000 * apart_m:.0f} mm from where it was without a pause")
     figures = {"plain_s": plain.took_s, "paused_s": ending.took_s, "apart_m": apart_m}
-    return failures, figures | {"moved_rad": moved_rad}
+    placed = {"placement_error_m": inside["placement_error_m"]}
+    return failures, figures | placed | {"moved_rad": moved_rad}
 
 
 def _pause(stack: LockstepStack) -> float:
@@ -217,11 +219,12 @@ def one_after_another() -> list[dict[str, Any]]:
 
 
 @contextmanager
-def _robot(seed: int) -> Iterator[LockstepStack]:
+def _robot(seed: int, watch: Watch) -> Iterator[LockstepStack]:
     with (
         tempfile.TemporaryDirectory(prefix="vla-") as folder,
         armed_lockstep(Path(folder), seed=seed) as stack,
     ):
+        watch(stack)
         yield stack
 
 

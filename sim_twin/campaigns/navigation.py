@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.campaigns.evidence import Watch, unwatched
 from sim_twin.campaigns.processes import played
 from sim_twin.campaigns.report import CampaignCase, CampaignReport
 from sim_twin.campaigns.selection import chosen
@@ -60,6 +61,12 @@ class _Notes:
 
     failures: list[str] = field(default_factory=list)
     figures: dict[str, Any] = field(default_factory=dict)
+    touches: int = 0
+
+    def touched(self, way: str = "") -> None:
+        """Note that the robot touched what stands fast."""
+        self.touches += 1
+        self.failures.append(f"touched something{way}")
 
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
@@ -73,12 +80,13 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     return CampaignReport(campaign="navigation", cases=cases, summary=_summary(cases))
 
 
-def play(name: str) -> CampaignCase:
+def play(name: str, watch: Watch = unwatched) -> CampaignCase:
     """Play the case of that name."""
     kind, _, which = name.partition("/")
     clock = MonotonicClock()
     begun_ns, notes = clock.now_ns(), _Notes()
     with _robot(int(which) if which.isdigit() else 0) as course:
+        watch(course.stack)
         match kind:
             case "following":
                 _follow(course, notes)
@@ -89,7 +97,7 @@ def play(name: str) -> CampaignCase:
     return CampaignCase(
         name=name,
         failures=tuple(notes.failures),
-        figures=notes.figures,
+        figures=notes.figures | {"touches": notes.touches},
         seconds=(clock.now_ns() - begun_ns) / NS_PER_S,
     )
 
@@ -182,7 +190,7 @@ def _drive(course: _Course, kind: str, notes: _Notes) -> None:
             held += now != cause and "stop_zone" in now
             cause = now
             if course.touches():
-                notes.failures.append(f"touched something on the way to the {spoken(room)}")
+                notes.touched(f" on the way to the {spoken(room)}")
                 break
         if not (outcome or {}).get("success"):
             notes.failures.append(f"{room}: {(outcome or {}).get('error') or 'no end in time'}")
@@ -256,7 +264,7 @@ def _follow(course: _Course, notes: _Notes) -> None:
         stroll = (at_m[0], at_m[1])
         away_m.append(math.dist(course.at, stroll))
         if course.touches():
-            notes.failures.append("touched something")
+            notes.touched()
             break
     low_m, high_m = BESIDE_M
     share = mean(low_m <= one <= high_m for one in away_m)
@@ -281,8 +289,10 @@ def _stroll_on(course: _Course, at: tuple[float, float]) -> None:
             way = course.planner.around(robot, 0.45).plan(at, (goal.x_m, goal.y_m))
         except NoPath:
             continue
+        if _length_m(way) <= 1.0:
+            continue
         samples = np.vstack([np.linspace(a, b, 30) for a, b in pairwise(way)])
-        if _length_m(way) > 1.0 and np.hypot(*(samples - robot).T).min() > 0.75:
+        if np.hypot(*(samples - robot).T).min() > 0.75:
             course.person.walk(way.tolist(), STROLL_M_S)
             return
     course.person.walk([list(at)], STROLL_M_S)
@@ -295,7 +305,7 @@ def _sweep(course: _Course, room: str, notes: _Notes) -> None:
     while (outcome := stack.outcome(command_id)) is None and stack.lockstep.now_s < end_s:
         stack.lockstep.run_for(_LOOK_S)
         if course.touches():
-            notes.failures.append("touched something")
+            notes.touched()
             break
     results = (outcome or {}).get("actions", ())
     covered = next((one["data"]["covered_ratio"] for one in results if one.get("data")), 0.0)

@@ -6,8 +6,10 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from xml.etree import ElementTree
+
+from sim_twin.campaigns.selection import OptionRefused
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +47,11 @@ class CampaignReport:
     def failed(self) -> tuple[CampaignCase, ...]:
         """Return the cases that failed."""
         return tuple(case for case in self.cases if case.failures)
+
+    @property
+    def passed(self) -> bool:
+        """Return whether all was as it must be."""
+        return not self.failed
 
     @property
     def skipped(self) -> tuple[CampaignCase, ...]:
@@ -93,30 +100,33 @@ class CampaignReport:
         ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def told(case: CampaignCase, tell: Callable[[str], None]) -> CampaignCase:
+CaseT = TypeVar("CaseT", bound=CampaignCase)
+
+
+def told(case: CaseT, tell: Callable[[str], None]) -> CaseT:
     """Report a case as soon as it is over, and return it."""
     tell(case.row)
     return case
 
 
-class NoRoom(Exception):
-    """Say why no report can be written where `--junit` wants it."""
+class NoRoom(OptionRefused):
+    """Say why no report can be written where an option wants it."""
 
 
-def make_room(junit: Path) -> None:
-    """Make the folder of the report before anything is played: hours later it is too late.
+def make_room(option: str, path: Path) -> None:
+    """Make the folder of a report before anything is played: hours later it is too late.
 
     Raises:
         NoRoom: it cannot be made, or no file can be written there.
     """
     try:
-        junit.parent.mkdir(parents=True, exist_ok=True)
-        if junit.is_dir():
-            raise IsADirectoryError(errno.EISDIR, "it is a folder", str(junit))
-        if not os.access(junit if junit.exists() else junit.parent, os.W_OK):
-            raise PermissionError(errno.EACCES, "it cannot be written", str(junit))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+        if not os.access(path if path.exists() else path.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, "it cannot be written", str(path))
     except OSError as error:
-        raise NoRoom(f"--junit {junit}: {error.strerror}: {error.filename}") from error
+        raise NoRoom(f"{option} {path}: {error.strerror}: {error.filename}") from error
 
 
 def _short(value: object) -> str:

@@ -7,7 +7,11 @@ _SHOWN: Final = 6
 T = TypeVar("T")
 
 
-class NothingChosen(Exception):
+class OptionRefused(Exception):
+    """Say why an option cannot be met."""
+
+
+class NothingChosen(OptionRefused):
     """Say that no case has such a name, and which names there are."""
 
 

@@ -53,6 +53,21 @@ def _is_obstacle(model: mujoco.MjModel, geom: int) -> bool:
     return collides and immovable and model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE
 
 
+def footprints_m(
+    model: mujoco.MjModel, data: mujoco.MjData
+) -> list[tuple[tuple[float, float], ...]]:
+    """Return the corners, in the map, of the boxes that stand fast: walls and furniture."""
+    found = []
+    for geom in range(model.ngeom):
+        if _is_obstacle(model, geom) and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+            half = _half_sizes(model, geom)
+            corners = np.array(((-1, -1), (1, -1), (1, 1), (-1, 1))) * half[:2]
+            turned = corners @ data.geom_xmat[geom].reshape(3, 3)[:2, :2].T
+            at = turned + data.geom_xpos[geom, :2]
+            found.append(tuple((round(float(x), 2), round(float(y), 2)) for x, y in at))
+    return found
+
+
 def _height_span(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[float, float]:
     half = float(_half_sizes(model, geom)[2])
     z = float(data.geom_xpos[geom, 2])

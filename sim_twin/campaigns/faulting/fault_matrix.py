@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from sim_twin.campaigns.evidence import Watch, unwatched
 from sim_twin.campaigns.faulting.choreography import Phase, choreography_of
 from sim_twin.campaigns.faulting.phases import NotSet, PhaseStage
 from sim_twin.campaigns.faulting.separation import Separation
@@ -117,26 +118,62 @@ def _is_possible(cell: Cell, robot: RobotDescription) -> bool:
     return True
 
 
-def play(cell: Cell, seed: int = 0, robot: str = "butler") -> CampaignCase:
+def play(
+    cell: Cell, seed: int = 0, robot: str = "butler", watch: Watch = unwatched
+) -> CampaignCase:
     """Play one case on a robot of its own and judge it."""
-    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        takes_all = cell.component in _SENSORS
-        with closing(lockstep_robot(Path(folder), seed, takes_all=takes_all, robot=robot)) as stack:
-            try:
-                return _Trial(cell, stack).run()
-            except (NotSet, RobotFailed) as error:
-                why = f"the stage could not be set: {error}"
-                return CampaignCase(name=cell.name, failures=(why,))
+    description = load_robot(robot)
+    request = cell.request(description)
+    return play_disturbance(
+        Disturbance(
+            name=cell.name,
+            phase=cell.phase,
+            happens=lambda stack: stack.lockstep.faults.inject_checked(request),
+            limp=cell.limp_joints(description),
+            takes_all=cell.component in _SENSORS,
+        ),
+        seed,
+        robot,
+        watch,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """Hold what happens to a robot in a phase of its work; `limp` joints may fall then."""
+
+    name: str
+    phase: Phase
+    happens: Callable[[LockstepControl], object]
+    limp: frozenset[str] = frozenset()
+    takes_all: bool = False
+    """Whether it needs the whole stack."""
+
+
+def play_disturbance(
+    what: Disturbance, seed: int = 0, robot: str = "butler", watch: Watch = unwatched
+) -> CampaignCase:
+    """Let it happen to a robot of its own and judge whether that was safe."""
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-") as folder,
+        closing(lockstep_robot(Path(folder), seed, takes_all=what.takes_all, robot=robot)) as stack,
+    ):
+        watch(stack)
+        try:
+            return _Trial(what, stack).run()
+        except (NotSet, RobotFailed) as error:
+            why = f"the stage could not be set: {error}"
+            return CampaignCase(name=what.name, failures=(why,))
 
 
 class _Trial:
-    """Watch one robot through one fault."""
+    """Watch one robot through one disturbance."""
 
-    def __init__(self, cell: Cell, stack: LockstepControl) -> None:
-        self._cell = cell
+    def __init__(self, what: Disturbance, stack: LockstepControl) -> None:
+        self._what = what
         self._stack = stack
         self._stage = PhaseStage(stack)
-        self._limp = cell.limp_joints(stack.robot)
+        self._limp = what.limp
         engine = stack.lockstep.twin.engine
         drives = stack.robot.parts.base is not None
         self._separation = Separation(engine.model, engine.data) if drives else None
@@ -147,12 +184,12 @@ class _Trial:
 
     def run(self) -> CampaignCase:
         """Set the stage, let it fail, and judge."""
-        lockstep, cell = self._stack.lockstep, self._cell
-        self._stage.begin(cell.phase)
+        lockstep, what = self._stack.lockstep, self._what
+        self._stage.begin(what.phase)
         lockstep.twin.hazards.begin()
         firm = [name for name in self._stack.robot.joint_names if name not in self._limp]
         seen = FaultWitness(self._stack, lockstep.now_s, (*firm, *self._stack.robot.wheel_joints))
-        lockstep.faults.inject_checked(cell.request(self._stack.robot))
+        what.happens(self._stack)
         while seen.since_s < _FAULT_S + _AFTER_S:
             self._stage.run_for(_LOOK_S)
             seen.look()
@@ -160,7 +197,7 @@ class _Trial:
                 self._separation.look()
             self._watch_stop(seen)
         return CampaignCase(
-            name=cell.name,
+            name=what.name,
             failures=tuple(self._failures()),
             figures={
                 "cause": seen.cause,
@@ -201,13 +238,13 @@ class _Trial:
         if self._least_gap_m < _LEAST_GAP_M:
             yield f"{self._least_gap_m:.4f} m to furniture, limit {_LEAST_GAP_M}"
         limp_grippers = self._limp & self._stack.robot.gripper_joints
-        carries = self._cell.phase is Phase.CARRYING and not limp_grippers
+        carries = self._what.phase is Phase.CARRYING and not limp_grippers
         if carries and not self._stage.holds_payload:
             yield f"{self._stage.moves.payload} is no longer in the hand"
 
     def _may(self, hazard: Hazard) -> bool:
         """Return whether a servo without torque accounts for it."""
-        carries = self._cell.phase is Phase.CARRYING
+        carries = self._what.phase is Phase.CARRYING
         falls = hazard.kind == "fall" and hazard.part == self._stage.moves.payload and carries
         swings = hazard.kind in ("joint speed", "joint range") and hazard.part in self._limp
         return bool(self._limp) and (falls or swings)

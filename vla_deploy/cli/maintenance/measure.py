@@ -40,13 +40,27 @@ CAMPAIGNS: Final = {
     "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
     "switches": "hot profile switches under motion, and bad profiles",
     "soak": "hours of work in lock-step: memory, files and threads must not grow",
+    "suite": "named scenes of one suite, or of all, with scores; --html, --compare, --ray",
+}
+SUITES: Final = {
+    "voice": "spoken commands, understood and executed",
+    "navigation": "drives, around a chair, past somebody, following",
+    "manipulation": "the jobs of `demo` of Butler and of an arm on a table",
+    "integration": "whole missions, also side by side and paused",
+    "safety": "stops, a shove, and a few faults in motion",
+    "all": "all of them",
 }
 _BENCH_EXAMPLES: Final = "  vla-deploy bench bus --family feetech --json\n  vla-deploy bench twin\n"
 _VALIDATE_EXAMPLES: Final = """  vla-deploy validate demos --robot so101
   vla-deploy validate faults --only servo_bus --json
   vla-deploy validate kills --count 20 --junit out/kills.xml
+  vla-deploy validate suite all --html out/suite.html
+  vla-deploy validate suite navigation --json --compare out/earlier.json
 """
-_PASSED_ON: Final = ("only", "count", "hours", "seed", "workers", "junit", "robot")
+_PASSED_ON: Final = (
+    *("only", "count", "hours", "seed", "workers", "junit", "robot"),
+    *("html", "compare", "ray"),
+)
 
 
 def register(commands: Any) -> None:
@@ -65,17 +79,35 @@ def register(commands: Any) -> None:
         commands, "validate", _VALIDATE_EXAMPLES, run_campaign, json_help="print the report as JSON"
     )
     validate.add_argument("campaign", choices=tuple(CAMPAIGNS), help=_listed(CAMPAIGNS))
+    validate.add_argument(
+        "suite", nargs="?", choices=tuple(SUITES), help=f"of suite; {_listed(SUITES)}"
+    )
     validate.add_argument("--only", metavar="TEXT", help="only cases whose name contains this")
     validate.add_argument("--count", type=whole_number(), help="how many injections or switches")
     validate.add_argument(
         "--hours", type=number_above_zero("hours"), help="how long to soak (default: 1)"
     )
     validate.add_argument(
-        "--workers", type=whole_number(), help="how many cases at a time (default: 2)"
+        "--workers",
+        type=whole_number(),
+        help="how many cases at a time (default: 2; of suite: one a core)",
     )
     validate.add_argument("--robot", help="of demos, faults, kills and load (default: butler)")
     validate.add_argument("--seed", type=int, help="of the random moments (default: 0)")
     validate.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
+    validate.add_argument(
+        "--html", type=Path, metavar="FILE", help="of suite: write a page with plots too"
+    )
+    validate.add_argument(
+        "--compare", type=Path, metavar="FILE", help="of suite: a report that --json printed before"
+    )
+    validate.add_argument(
+        "--ray",
+        nargs="?",
+        const="local",
+        metavar="ADDRESS",
+        help="of suite: play on a Ray cluster; without ADDRESS on one of this computer",
+    )
 
 
 def _listed(summaries: Mapping[str, str]) -> str:
@@ -97,6 +129,7 @@ def run_bench(arguments: argparse.Namespace) -> int:
 def run_campaign(arguments: argparse.Namespace) -> int:
     """Replace this process by the campaign, so that it gets the signals; 1 where a case failed."""
     command = [sys.executable, "-m", "sim_twin.campaigns", arguments.campaign]
+    command += [arguments.suite] if arguments.suite else []
     for name in _PASSED_ON:
         value = vars(arguments)[name]
         if value is not None:

@@ -120,6 +120,7 @@ class Demo:
             clock = SteppingClock(supervisor)
             session = RobotSession(supervisor.run_dir, clock)
             self._wait_armed(session)
+            ask_referee(session, "hazards", begin="yes")
             film = self._start_film(session)
             started_ns, started_s = clock.now_ns(), time.monotonic()
             self._follow(self._give_command(session, clock), session)
@@ -127,6 +128,7 @@ class Demo:
             seen = self._control_counters(session)
             session.pause(SETTLE_S)
             judged = self._judge(session)
+            seen["pushes"] = _pushes(session)
             film_files = self._stop_film(session) if film else {}
             table = session.document(topics.PROCESS_TABLE)
         return self._outcome(took_s, wall_s, judged, film_files, table) | seen
@@ -259,6 +261,12 @@ def _object_and_container(plan: dict[str, Any]) -> tuple[str, str] | None:
         if action["skill"] == "place" and given["relation"] == "in" and picked:
             return picked, parse_object(given["destination"]).kind
     return None
+
+
+def _pushes(session: RobotSession) -> int:
+    """Return how many pairs of parts the physics saw pushing too hard."""
+    found = ask_referee(session, "hazards", begin="")["hazards"]
+    return sum(one["kind"] == "push" for one in found)
 
 
 def _summary(outcome: dict[str, Any], path: Path) -> str:
