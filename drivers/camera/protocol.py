@@ -8,7 +8,8 @@ Frame, camera to host:
     offset  size  meaning
     0       4     magic "VRGB"
     4       1     version, 1
-    5       3     reserved, 0
+    5       1     reserved, 0
+    6       2     from exposure until this header is sent, in 0.1 ms; 0 where that is not known
     8       4     sequence, counts up by one per exposed frame
     12      8     exposure stamp, device nanoseconds (middle of the exposure)
     20      4     width, height: uint16 each
@@ -33,8 +34,9 @@ REQUEST_MAGIC = b"VRGC"
 VERSION = 1
 MAX_PIXELS = 1920 * 1200
 BYTES_PER_PIXEL = 5
+_SENT_AFTER_UNIT_NS = 100_000
 CRC = struct.Struct("<I")
-_HEADER = struct.Struct("<4sB3xIQHHfffffI")
+_HEADER = struct.Struct("<4sBxHIQHHfffffI")
 HEADER_BYTES = _HEADER.size + CRC.size
 _REQUEST = struct.Struct("<4sBBH")
 REQUEST_BYTES = _REQUEST.size + CRC.size
@@ -66,12 +68,13 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameHeader:
-    """Hold what precedes a frame's payload."""
+    """Hold what precedes a payload; `sent_after_ns` counts from the exposure, 0: not known."""
 
     sequence: int
     exposure_ns: int
     intrinsics: Intrinsics
     depth_unit_m: float
+    sent_after_ns: int = 0
 
     @property
     def payload_bytes(self) -> int:
@@ -85,6 +88,7 @@ def encode_header(header: FrameHeader) -> bytes:
     packed = _HEADER.pack(
         FRAME_MAGIC,
         VERSION,
+        min(header.sent_after_ns // _SENT_AFTER_UNIT_NS, 0xFFFF),
         header.sequence & 0xFFFF_FFFF,
         header.exposure_ns,
         camera.width,
@@ -104,7 +108,7 @@ def decode_header(data: bytes) -> FrameHeader | None:
     packed, (crc,) = data[: _HEADER.size], CRC.unpack_from(data, _HEADER.size)
     if zlib.crc32(packed) != crc:
         return None
-    _, version, sequence, exposure_ns, width, height, fx, fy, cx, cy, unit_m, length = (
+    _, version, sent_after, sequence, exposure_ns, width, height, fx, fy, cx, cy, unit_m, length = (
         _HEADER.unpack(packed)
     )
     header = FrameHeader(
@@ -112,6 +116,7 @@ def decode_header(data: bytes) -> FrameHeader | None:
         exposure_ns=exposure_ns,
         intrinsics=Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy),
         depth_unit_m=unit_m,
+        sent_after_ns=sent_after * _SENT_AFTER_UNIT_NS,
     )
     plausible = 0 < width * height <= MAX_PIXELS and header.payload_bytes == length
     return header if version == VERSION and plausible else None

@@ -165,7 +165,9 @@ class RgbdCamera:
         rgb = np.frombuffer(payload, dtype=np.uint8, count=3 * pixels)
         depth = np.frombuffer(payload, dtype="<u2", offset=3 * pixels)
         return RgbdFrame(
-            stamp_ns=self._device_clock.to_host_ns(header.exposure_ns, self._clock.now_ns()),
+            stamp_ns=self._device_clock.to_host_ns(
+                header.exposure_ns, self._clock.now_ns() - header.sent_after_ns
+            ),
             sequence=header.sequence,
             intrinsics=camera,
             depth_unit_m=header.depth_unit_m,

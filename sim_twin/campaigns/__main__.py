@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import demos, load, missions, navigation, soak
+from sim_twin.campaigns import agents, demos, load, missions, navigation, soak
 from sim_twin.campaigns.cutting import power_cuts
 from sim_twin.campaigns.faulting import fault_matrix
 from sim_twin.campaigns.killing import kills
@@ -29,6 +29,7 @@ from vla_deploy.cli.maintenance.measure import SUITES
 CAMPAIGNS: Final[
     Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], CampaignReport]]
 ] = {
+    "agents": agents.run,
     "demos": demos.run,
     "faults": fault_matrix.run,
     "kills": kills.run,

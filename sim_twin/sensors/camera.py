@@ -113,6 +113,7 @@ class CameraDevice:
             exposure_ns=now_ns,
             intrinsics=self._intrinsics,
             depth_unit_m=DEPTH_UNIT_M,
+            sent_after_ns=self._latency_ns,
         )
         self._sequence += 1
         payload = np.ascontiguousarray(rgb).tobytes() + self._quantised(depth_m).tobytes()

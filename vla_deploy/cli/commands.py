@@ -77,6 +77,12 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "mission": CommandEntry(
         "operation.mission", "give a mission of several objectives, and see how far it is"
     ),
+    "agent": CommandEntry(
+        "operation.agent", "lease the robot to AI agents for a while, and take the lease back"
+    ),
+    "mcp": CommandEntry(
+        "operation.mcp", "serve AI agents by the Model Context Protocol; started by the agent"
+    ),
     "joint": CommandEntry(
         "operation.joint", "show where the joints are, move one, replay an episode"
     ),

@@ -22,6 +22,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.cli.errors": "UsageError",
     "drivers.errors": "DriverError",
     "vla_deploy.client.access.errors": "AccessError",
+    "vla_deploy.gateways.mcp.errors": "AgentGatewayError",
     "vla_deploy.gateways.ros.errors": "RosGatewayError",
     "vla_deploy.install.errors": "InstallError",
     "vla_deploy.inference.errors": "InferenceError",

@@ -118,11 +118,7 @@ def _events_of(
     following: Following, events: RingReader[TaskEvent], pause: Callable[[], None]
 ) -> Iterator[TaskEvent]:
     while True:
-        why = following.why_lost()
-        yield from following.take([event.payload for event in events.drain()])
-        concluded = following.conclude(why)
-        if concluded is not None:
-            yield concluded
+        yield from following.look(events)
         if following.has_ended:
             return
         if following.is_unanswered:

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import UNFINISHED, ActionStatus, summary_of
-from vla_deploy.ipc import Sample
+from vla_deploy.ipc import RingReader, Sample
 from vla_deploy.ipc.payloads.tasks import (
     ActionResult,
     ExecutorStatus,
@@ -54,6 +54,13 @@ class Following:
     def why_lost(self) -> str:
         """Return why nobody works on the command, or "" while somebody may."""
         return self._watch.why_lost() if self.is_answered else ""
+
+    def look(self, events: RingReader[TaskEvent]) -> list[TaskEvent]:
+        """Return what is new; the last event is made here where nobody works on it any more."""
+        why = self.why_lost()
+        told = list(self.take([event.payload for event in events.drain()]))
+        last = self.conclude(why)
+        return told if last is None else [*told, last]
 
     def take(self, events: Iterable[TaskEvent]) -> Iterator[TaskEvent]:
         """Yield those that are the command's, up to its last one."""

@@ -10,6 +10,7 @@ from vla_deploy.dashboard.access import AccessControl, guard
 from vla_deploy.dashboard.access import routes as access_routes
 from vla_deploy.dashboard.access.request import API_PREFIX
 from vla_deploy.dashboard.api import (
+    agents,
     analysis,
     commands,
     memory,
@@ -33,6 +34,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     state.router,
     analysis.router,
     commands.router,
+    agents.router,
     missions.router,
     memory.router,
     operate.router,

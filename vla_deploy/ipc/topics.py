@@ -364,6 +364,14 @@ VOICE_EVENT = Topic(
     slots=64,
     slot_bytes=1024,
 )
+AGENT_LEASE = Topic(
+    name="agent_lease",
+    kind=TopicKind.CELL,
+    owner="any",
+    summary="until when agents may give commands, and who said so, as JSON; on change",
+    payload=tasks.AgentLease,
+    fields=(PackedField("document", "json", 1024),),
+)
 PLAN = Topic(
     name="plan",
     kind=TopicKind.RING,

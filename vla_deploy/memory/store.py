@@ -28,6 +28,8 @@ FILE_NAME: Final = "memory.sqlite3"
 MOST_EPISODES: Final = 5_000
 MOST_THINGS: Final = 1_000
 PATIENCE_S: Final = 2.0
+_LARGEST: Final = 2**63 - 1
+"""SQLite counts no further."""
 _EPISODE: Final = (
     "number, told_s, command, outcome, source, goal, reasoning, plan, rung, error, duration_s, "
     "actions, judged_from, why"
@@ -224,9 +226,11 @@ class MemoryStore:
             yield self._connection
 
     def _one(self, number: int) -> Episode:
-        row = self._connection.execute(
-            f"SELECT {_EPISODE} FROM episode WHERE number = ?", (number,)
-        ).fetchone()
+        row = None
+        if abs(number) <= _LARGEST:
+            row = self._connection.execute(
+                f"SELECT {_EPISODE} FROM episode WHERE number = ?", (number,)
+            ).fetchone()
         if row is None:
             raise NoSuchEpisode(
                 f"nothing number {number} is remembered; see: vla-deploy memory list"

@@ -4,6 +4,7 @@ import sys
 from typing import Final
 
 from platforms import load_profile
+from vla_deploy.client.access.audit_log import AuditLog
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.memory.meaning import installed_embedder
@@ -12,7 +13,7 @@ from vla_deploy.planning.assembly import open_memory, planner_for
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.prohibitions import Prohibitions
 from vla_deploy.robots import load_robot
-from vla_deploy.runtime.executors import worker_thread
+from vla_deploy.runtime.executors import low_priority_thread, worker_thread
 from vla_deploy.runtime.node import NodeContext
 from vla_deploy.runtime.process_main import main
 from vla_deploy.runtime.state_dir import state_dir_of
@@ -33,7 +34,8 @@ def build(context: NodeContext) -> PlannerNode:
     executor = worker_thread("plan", context.clock, PLANNING_S)
     missions = MissionStore(state_dir_of(base) / FILE_NAME)
     forbidden = Prohibitions.of_base(base)
-    return PlannerNode(context, robot, planner, executor, memory, forbidden, missions)
+    audit = AuditLog.of_base(base, context.clock, low_priority_thread(context.clock))
+    return PlannerNode(context, robot, planner, executor, memory, forbidden, missions, audit=audit)
 
 
 if __name__ == "__main__":

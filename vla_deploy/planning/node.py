@@ -8,6 +8,8 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile
+from vla_deploy.client.access.audit_log import AuditLog
+from vla_deploy.client.agent_lease import LeaseKeeper
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace, topics
 from vla_deploy.ipc.payloads.tasks import (
     PlanMessage,
@@ -21,6 +23,7 @@ from vla_deploy.memory.keeper import MemoryKeeper
 from vla_deploy.missions.store import MissionStore
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.active_plans import RESTARTED
+from vla_deploy.planning.dialogue.agent_guard import AgentGuard
 from vla_deploy.planning.dialogue.battery_watch import BatteryWatch
 from vla_deploy.planning.dialogue.command import (
     UserCommand,
@@ -35,6 +38,7 @@ from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import NotReadyToMove
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibitions import Prohibitions
+from vla_deploy.plans.agent_rules import LEASE_ENDED, of_agent
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
@@ -64,6 +68,7 @@ class PlannerNode:
         prohibitions: Prohibitions | None = None,
         missions: MissionStore | None = None,
         wall_s: Callable[[], float] | None = None,
+        audit: AuditLog | None = None,
     ) -> None:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
@@ -75,6 +80,7 @@ class PlannerNode:
         self._prohibitions = prohibitions
         self._mission_store = missions
         self._wall_s = wall_s or _wall_time_of(context.clock)
+        self._agents = AgentGuard(LeaseKeeper(self._space, self._clock), audit)
         self._missions: MissionManager
         self._keeper: MemoryKeeper | None = None
         self._battery: BatteryWatch | None = None
@@ -92,7 +98,9 @@ class PlannerNode:
         self._events = self._space.ring_reader(topics.TASK_EVENT, from_start=True)
         plans = self._space.ring_reader(topics.PLAN, from_start=True)
         told = self._events.drain()
-        before = _unfinished(self._utterances.drain(), told, plans.drain())
+        heard = self._utterances.drain()
+        before = _unfinished(heard, told, plans.drain())
+        self._agents.remember(heard)
         self._publisher = PlannerEvents(self._space, self._clock)
         if self._memory is not None:
             self._keeper = MemoryKeeper(
@@ -146,6 +154,7 @@ class PlannerNode:
             self._hear(said)
         for event in self._events.drain():
             self._note(event)
+        self._end_unleased()
         self._manager.advance()
         self._missions.advance()
         if self._battery is not None:
@@ -166,6 +175,7 @@ class PlannerNode:
         self._executor.shutdown(wait=False, cancel_futures=True)
         if self._keeper is not None:
             self._keeper.close()
+        self._agents.close()
         self._space.close()
 
     def prepare(self, profile: Profile, model_tier: int) -> Planner:
@@ -196,6 +206,8 @@ class PlannerNode:
             return
         try:
             self._check_age(event)
+            waiting = self._manager.dialogue.waits_for_person
+            self._agents.check(event, waiting, self._missions.are_several)
             if "pause" in event.payload:
                 command = UserCommand(command_id=command_id_of(event), told_ns=event.stamp_ns)
                 self._manager.pause(command, pause=bool(event.payload["pause"]))
@@ -237,7 +249,16 @@ class PlannerNode:
         if event.payload.get("cancel"):
             return True
         declines = self._manager.dialogue.declines(event.payload.get("text"))
-        return asks_to_stop(event) and not declines
+        return asks_to_stop(event) and (not declines or of_agent(event))
+
+    def _end_unleased(self) -> None:
+        """End what agents asked for, once they may ask for nothing more."""
+        manager = self._manager
+        for command_id in self._agents.take_ended(lambda: manager.in_work | manager.carried_out):
+            is_carried_out = command_id in manager.carried_out
+            manager.drop(command_id)
+            if not is_carried_out:
+                self._refuse(command_id, LEASE_ENDED)
 
     def _note(self, event: Event[TaskEvent]) -> None:
         """Note what the executor publishes of a command."""

@@ -5,6 +5,7 @@ PlanError
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
 ├── UnknownDevice     name a device of the robot file
+├── AgentRefused      let a person grant a lease, or do it: an agent asked (plans.agent_rules)
 └── PlanInvalid       mend the plan; carries every fault
 
 `vla_deploy.planning.errors` adds why there is no plan for a command.

@@ -1,6 +1,7 @@
 """Describe a robot's camera: what the robot file says of it, and what was calibrated."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,9 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from drivers.registry import SensorKind, sensor_model
 from vla_deploy.robots.kinematics.orientation import matrix
+
+MOST_PIXELS: Final = 640 * 480
+"""Of an image: so many have room between processes (`ipc.topics.RGBD`)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

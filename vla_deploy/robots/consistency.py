@@ -14,6 +14,7 @@ from drivers.power_relay.open_relay import PULSED
 from drivers.registry import SensorKind, model_names, sensor_model
 from drivers.servo.family import family_of
 from vla_deploy.robots.battery_settings import battery_is_usable
+from vla_deploy.robots.camera import MOST_PIXELS
 from vla_deploy.runtime.table_schema import TableFault, is_number
 
 Document = Mapping[str, Any]
@@ -299,6 +300,19 @@ def hands_that_see_reach(document: Document) -> Iterator[TableFault]:
                 yield TableFault(key=f"poses.{pose}", got=f"no {joint}", expected=f"it, for {key}")
 
 
+def images_fit_their_ring(document: Document) -> Iterator[TableFault]:
+    """An image is no larger than what processes share of it."""
+    camera = table(document, "camera")
+    width, height = camera.get("width"), camera.get("height")
+    if is_number(width) and is_number(height) and width * height > MOST_PIXELS:
+        yield TableFault(
+            key="camera.width, camera.height",
+            got=f"{width} x {height}",
+            expected=f"at most {MOST_PIXELS} pixels together, as 640 x 480 has: set a smaller "
+            "size, which the camera or its driver scales to",
+        )
+
+
 def cameras_without_depth_stand_still(document: Document) -> Iterator[TableFault]:
     """A camera without depth is a mounted robot's, whose hands take things of known sizes."""
     model = table(document, "camera").get("model")
@@ -423,6 +437,7 @@ CHECKS: tuple[Callable[[Document], Iterator[TableFault]], ...] = (
     hands_name_groups,
     hands_that_see_reach,
     cameras_without_depth_stand_still,
+    images_fit_their_ring,
     head_turns_by_servos,
     poses_are_reachable,
     places_are_distinct,

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from vla_deploy.client.agent_lease import judge_lease
 from vla_deploy.client.link import RobotLink
 from vla_deploy.client.place_state import Doubt, PlaceState
 from vla_deploy.ipc import Sample, topics
@@ -27,6 +28,7 @@ def collect(link: RobotLink) -> dict[str, Any]:
         "speech": link.document(topics.SPEECH_STATUS, age_limit_s=2.0),
         "battery": link.document(topics.BATTERY, topics.BATTERY.deadline_s),
         "profile": link.document(topics.PROFILE_STATUS, age_limit_s=3.0),
+        "agents": judge_lease(link.document(topics.AGENT_LEASE), link.clock.now_ns()).document(),
         "replay": link.document(topics.REPLAY_STATUS, age_limit_s=3.0),
         "dashboard_url": None if dashboard is None else dashboard["url"],
     }

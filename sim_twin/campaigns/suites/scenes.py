@@ -10,6 +10,7 @@ from sim_twin.campaigns.evidence import SceneEvidence, SceneWatch, Watch
 from sim_twin.campaigns.report import CampaignCase
 from sim_twin.campaigns.suites import safety, voice
 from sim_twin.campaigns.suites.report import ScoredCase
+from sim_twin.harness.robot import RobotFailed
 
 ALL: Final = "all"
 _CONTACTS: Final = ("touches", "pushes")
@@ -122,7 +123,10 @@ def play(case: SuiteScene) -> ScoredCase:
     """Play a case and score it; of what passed no pictures are kept."""
     suite, watch, clock = SUITES[case.suite], SceneWatch(), MonotonicClock()
     begun_ns = clock.now_ns()
-    played = suite.play(case.scene, case.seed, watch)
+    try:
+        played = suite.play(case.scene, case.seed, watch)
+    except RobotFailed as error:
+        played = CampaignCase(name=case.name, failures=(f"the robot failed: {error}",))
     return scored(case, played, watch.evidence, (clock.now_ns() - begun_ns) / NS_PER_S)
 
 

@@ -12,13 +12,20 @@ MS = 1_000_000
 
 
 def frame(
-    sequence: int, exposure_ns: int = 0, width: int = 4, height: int = 3, fill: int = 7
+    sequence: int,
+    exposure_ns: int = 0,
+    width: int = 4,
+    height: int = 3,
+    fill: int = 7,
+    sent_after_ms: float = 0.0,
 ) -> bytes:
     """Encode independently of the driver, straight from the protocol's table."""
     pixels = width * height
     payload = bytes([fill]) * (3 * pixels) + struct.pack("<H", 1000 + fill) * pixels
     head = (
-        b"VRGB" + bytes([1, 0, 0, 0]) + struct.pack("<IQHH", sequence, exposure_ns, width, height)
+        b"VRGB"
+        + bytes([1, 0])
+        + struct.pack("<HIQHH", round(10 * sent_after_ms), sequence, exposure_ns, width, height)
     )
     head += struct.pack("<5fI", 200.0, 201.0, 1.5, 1.0, 0.001, len(payload))
     return (
@@ -120,6 +127,15 @@ def test_a_camera_that_restarts_its_clock_is_followed() -> None:
     got = camera.poll()
     assert got is not None
     assert got.stamp_ns == clock.ns
+
+
+def test_how_long_the_camera_itself_took_is_no_part_of_the_way_to_the_host() -> None:
+    camera, line, clock = make()
+    clock.ns = 5_000 * MS
+    line.pending += frame(1, exposure_ns=1_000 * MS, sent_after_ms=40.0)
+    got = camera.poll()
+    assert got is not None
+    assert got.stamp_ns == 4_960 * MS
 
 
 def test_large_frames_in_small_pieces_do_not_take_quadratic_time() -> None:

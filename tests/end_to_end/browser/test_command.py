@@ -67,6 +67,17 @@ def test_what_the_robot_asks_is_answered_by_a_button(page: Page) -> None:
     expect(question).to_have_count(0)
 
 
+def test_an_admin_leases_the_robot_to_agents_and_takes_it_back(page: Page) -> None:
+    card = page.get_by_role("region", name="AI agents")
+    expect(card).to_contain_text("may read and stop")
+    card.get_by_role("button", name="5 min", exact=True).click()
+    card.get_by_role("button", name="Lease the robot").click()
+    page.get_by_role("dialog").get_by_role("button", name="Lease", exact=True).click()
+    expect(card).to_contain_text("5 min yet, by leave of anna")
+    card.get_by_role("button", name="Take it back").click()
+    expect(card).to_contain_text("may read and stop")
+
+
 def test_a_command_is_cancelled_and_the_robot_stays_ready(page: Page, robot: ProcessStack) -> None:
     card = give(page, "go to the kitchen")
     expect(card.locator("[data-status=active]")).to_be_visible()

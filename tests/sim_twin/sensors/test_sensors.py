@@ -262,10 +262,11 @@ def test_depth_noise_grows_with_the_square_of_distance_and_far_is_no_depth() -> 
     assert np.all(clean[0].depth[1:] == 1000)
 
 
-def test_latency_delays_delivery() -> None:
-    frames, _, _ = run_camera(1.0, 5.0, latency_s=0.06)
-    prompt, _, _ = run_camera(1.0, 5.0)
-    assert frames[0].stamp_ns - prompt[0].stamp_ns == pytest.approx(60e6, abs=20e6)
+def test_latency_delays_delivery_and_no_stamp() -> None:
+    frames, late, _ = run_camera(0.95, 5.0, latency_s=0.16)
+    prompt, _, _ = run_camera(0.95, 5.0)
+    assert (len(frames), len(prompt), late.renders) == (4, 5, 5)
+    assert frames[0].stamp_ns - prompt[0].stamp_ns == pytest.approx(0.0, abs=20e6)
 
 
 def test_a_restarted_request_with_the_same_rate_keeps_the_cadence() -> None:

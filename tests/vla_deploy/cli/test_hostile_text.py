@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from vla_deploy.cli.main import main
-from vla_deploy.gateways.ros.inward.words import OrderInvalid, checked_text, shown
+from vla_deploy.gateways.words import OrderInvalid, checked_text, shown
 from vla_deploy.robots.loader import ROBOTS_DIR
 
 HOSTILE = {

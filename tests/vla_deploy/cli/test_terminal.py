@@ -10,10 +10,9 @@ from vla_deploy.cli import main as command_line
 from vla_deploy.cli.terminal import (
     CLEAR_LINE,
     control,
-    escaped,
-    escaped_document,
     escaping_output,
 )
+from vla_deploy.client.escaping import escaped, escaped_document
 
 
 @pytest.mark.parametrize(

@@ -206,9 +206,10 @@ def test_what_is_erased_stands_nowhere_in_the_file(store: MemoryStore) -> None:
     assert all(b"bedside" not in file.read_bytes() for file in store.path.parent.iterdir())
 
 
-def test_what_is_not_there_cannot_be_erased(store: MemoryStore) -> None:
-    with pytest.raises(NoSuchEpisode, match="nothing number 7 is remembered"):
-        store.erase(7)
+@pytest.mark.parametrize("number", [7, 2**63, -(10**30)])
+def test_what_is_not_there_cannot_be_erased(store: MemoryStore, number: int) -> None:
+    with pytest.raises(NoSuchEpisode, match=f"nothing number {number} is remembered"):
+        store.erase(number)
 
 
 def test_the_export_holds_everything_as_json(store: MemoryStore) -> None:

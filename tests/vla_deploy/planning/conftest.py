@@ -14,6 +14,7 @@ from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_session import PlannerSession, fresh_session
 from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import Profile, load_profile
+from vla_deploy.client.access.audit_log import AuditLog
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
 from vla_deploy.missions.store import MissionStore
@@ -117,22 +118,23 @@ class Desk:
         self._check = check
         self.executor = executor
         self.memory = memory
-        self._space = SharedSpace(run_dir / "ipc", clock)
+        self.audit: AuditLog | None = None
+        self.space = SharedSpace(run_dir / "ipc", clock)
         self._context = NodeContext(
             run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
         )
         self._slow = slow
         self._given = 0
         self.carried_out = ["another"]
-        self._utterances = self._space.ring_writer("utterance")
-        self._events = self._space.ring_reader("task_event", from_start=True)
-        self._plans = self._space.ring_reader("plan", from_start=True)
-        self._control = self._space.cell_writer("control_status")
-        self._status = self._space.cell_reader("planner_status")
-        self._scene = self._space.cell_writer("scene")
-        self._executor = self._space.ring_writer("task_event")
-        self._executor_status = self._space.cell_writer("executor_status")
-        self._voice = self._space.ring_reader("say", from_start=True)
+        self._utterances = self.space.ring_writer("utterance")
+        self._events = self.space.ring_reader("task_event", from_start=True)
+        self._plans = self.space.ring_reader("plan", from_start=True)
+        self._control = self.space.cell_writer("control_status")
+        self._status = self.space.cell_reader("planner_status")
+        self._scene = self.space.cell_writer("scene")
+        self._executor = self.space.ring_writer("task_event")
+        self._executor_status = self.space.cell_writer("executor_status")
+        self._voice = self.space.ring_reader("say", from_start=True)
         self.planner = self.start()
 
     def start(self) -> PlannerNode:
@@ -146,6 +148,7 @@ class Desk:
             self.memory,
             missions=MissionStore(self._context.run_dir / "missions.json"),
             wall_s=self.wall_s,
+            audit=self.audit,
         )
         self.planner.start()
         return self.planner
@@ -156,7 +159,7 @@ class Desk:
 
     def missions(self) -> list[dict[str, Any]]:
         """Return the missions as the planner shows them, the newest first."""
-        sample = self._space.cell_reader("missions").latest()
+        sample = self.space.cell_reader("missions").latest()
         assert sample is not None
         return sample.document()["missions"]
 
@@ -232,7 +235,7 @@ class Desk:
 
     def close(self) -> None:
         self.planner.stop()
-        self._space.close()
+        self.space.close()
 
 
 @pytest.fixture

@@ -117,6 +117,17 @@ def test_who_has_gone_by_is_forgotten(perception: Perception, detour: Detour) ->
     assert detour.closed_by == ""
 
 
+def test_somebody_who_leaves_no_room_is_who_closes_the_way(
+    perception: Perception, detour: Detour
+) -> None:
+    gap_m = 0.5
+    wall = [(2.5, y_m) for y_m in np.arange(-1.0, 6.0, 0.05) if abs(y_m - 2.0) > gap_m]
+    for _ in range(round(WAIT_S * 10) + 2):
+        perception.tell(wall[:200], (2.5, 2.0, 0.0, 0.0))
+        assert not detour.revise(HERE)
+    assert detour.closed_by.startswith("the way is closed by somebody, ")
+
+
 @pytest.mark.parametrize(("is_seen", "name"), [(False, "something"), (True, "a chair")])
 def test_what_closes_the_way_is_named(
     perception: Perception, detour: Detour, *, is_seen: bool, name: str

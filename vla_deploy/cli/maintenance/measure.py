@@ -29,6 +29,7 @@ BENCHMARKS: Final = {
     "twin": "twin steps against raw mj_step, and the lock-step real-time factor",
 }
 CAMPAIGNS: Final = {
+    "agents": "hostile calls of AI agents, with and without a lease, judged by physics",
     "demos": "the job of `demo` in one random scene after the other; --robot, --count, --seed",
     "faults": "every fault in every phase of the work, on the lock-step twin",
     "kills": "kill -9, SIGSTOP and SIGTERM of every process at random moments",

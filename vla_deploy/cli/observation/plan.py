@@ -1,7 +1,6 @@
 """`vla-deploy plan`: show the plan for a command and the back end that made it; nothing moves."""
 
 import argparse
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -13,15 +12,10 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.operation.say import EXIT_ASKED, read_json
 from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
 from vla_deploy.client.action_words import action_words
+from vla_deploy.gateways.plan_preview import PlanPreview, preview, preview_request
 from vla_deploy.ipc import topics
 from vla_deploy.planning.assembly import planner_for
-from vla_deploy.planning.dialogue.command import UserCommand
-from vla_deploy.planning.dialogue.confirmation import confirmation_of
-from vla_deploy.planning.dialogue.situation import Situation
-from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.interfaces import Attempt, PlanningResult, PlanRequest
-from vla_deploy.planning.understanding import Conversation
-from vla_deploy.plans.knowledge import world_of
+from vla_deploy.planning.interfaces import Attempt, PlanRequest
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.world import Snapshot, read_snapshot
 from vla_deploy.world.document import read_report
@@ -58,46 +52,27 @@ def run(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot or (table["robot"] if table else "butler"))
     profile = load_profile(arguments.profile or (status["profile"] if status else "desktop"))
     planner = planner_for(robot, profile, MonotonicClock(), base_of(arguments))
-    request = _request(arguments, robot, session)
-    result = planner.plan(request)
-    asks = confirmation_of(result.plan, request, result.proposal) if result.plan else ""
-    document = document_of(result, asks, planner.away)
-    emit(arguments, document, lambda: as_text(result, asks, planner.away))
-    if isinstance(result.error, Ambiguous):
+    found = preview(planner, _request(arguments, robot, session))
+    emit(arguments, found.document(), lambda: as_text(found))
+    if found.is_asked:
         return EXIT_ASKED
-    if result.error is not None:
-        raise result.error
+    if found.result.error is not None:
+        raise found.result.error
     return 0
 
 
-def document_of(result: PlanningResult, asks: str, away: Mapping[str, str]) -> dict[str, Any]:
-    """Return a result for JSON, with the confirmation it asks for and unavailable back ends."""
-    proposal = result.proposal
-    is_asked = isinstance(result.error, Ambiguous)
-    return {
-        "plan": None if result.plan is None else result.plan.model_dump(mode="json"),
-        "rung": None if proposal is None else proposal.back_end,
-        "confidence": None if proposal is None else round(proposal.confidence, 3),
-        "read_back": asks or None,
-        "question": str(result.error) if is_asked else None,
-        "refused": None if result.error is None or is_asked else str(result.error),
-        "attempts": [one.document() for one in result.attempts],
-        "away": dict(away),
-    }
-
-
-def as_text(result: PlanningResult, asks: str, away: Mapping[str, str]) -> str:
-    """Return a result as lines for a person."""
+def as_text(found: PlanPreview) -> str:
+    """Return a preview as lines for a person."""
+    result = found.result
     lines = [_attempt_line(one) for one in result.attempts]
-    lines += [f"{name} away: {why}" for name, why in away.items()]
+    lines += [f"{name} away: {why}" for name, why in found.away.items()]
     if result.plan is not None:
         lines += [
             f"  {one.id:<14} {action_words(one.skill, one.parameters)}"
             for one in result.plan.actions
         ]
-    question = result.error if isinstance(result.error, Ambiguous) else asks
-    if question:
-        lines.append(f"robot would ask: {question}")
+    if found.question:
+        lines.append(f"robot would ask: {found.question}")
     return "\n".join(lines)
 
 
@@ -116,12 +91,7 @@ def _session(arguments: argparse.Namespace) -> RobotSession | None:
 def _request(
     arguments: argparse.Namespace, robot: RobotDescription, session: RobotSession | None
 ) -> PlanRequest:
-    command = UserCommand(command_id="plan", told_ns=0, text=arguments.text)
-    if session is None:
-        request = PlanRequest(command_id="plan", text=command.text, world=world_of(robot, {}))
-    else:
-        situation = Situation(session.space, session.clock, robot)
-        request = situation.request(command, Conversation())
+    request = preview_request(arguments.text, robot, session)
     if arguments.scene is None:
         return request
     return replace(request, scene=read_scene(arguments.scene))

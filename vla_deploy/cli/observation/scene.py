@@ -7,12 +7,10 @@ from typing import Any
 from vla_deploy.cli.commands import add_top_command, emit
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import RobotSession, attach
-from vla_deploy.navigation.path_planning import base_planner
 from vla_deploy.plans.knowledge import match_place, spoken_places
+from vla_deploy.plans.scene_report import scene_report
 from vla_deploy.robots import RobotDescription
-from vla_deploy.world import Body, Query, Viewpoint, parse_query, read_snapshot
-from vla_deploy.world.document import report as report_on
-from vla_deploy.world.surfaces import furniture_points
+from vla_deploy.world import Viewpoint
 
 EXAMPLES = """  vla-deploy scene
   vla-deploy scene --of "red cup" --relations
@@ -50,20 +48,16 @@ def collect(session: RobotSession, arguments: argparse.Namespace) -> dict[str, A
         UnknownWord: the query has an unknown word.
     """
     document, robot = session.scene(), session.running_robot()
-    snapshot = read_snapshot(document, session.clock.now_ns())
     view = _view(arguments.view, robot)
-    query = _query(arguments, robot)
-    body = Body.of(robot, base_planner(robot).is_free)
-    return report_on(snapshot, query, body, furniture_points(robot.places), view)
+    return scene_report(document, robot, session.clock.now_ns(), _words(arguments), view)
 
 
-def _query(arguments: argparse.Namespace, robot: RobotDescription) -> Query:
-    furniture = spoken_places(robot.places)
-    words = arguments.of
+def _words(arguments: argparse.Namespace) -> str:
+    words: str = arguments.of
     for relation in ("near", "on"):
         if getattr(arguments, relation):
             words += f" {relation} {getattr(arguments, relation)}"
-    return parse_query(words, furniture)
+    return words
 
 
 def _view(place: str | None, robot: RobotDescription) -> Viewpoint | None:

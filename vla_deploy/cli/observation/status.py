@@ -43,6 +43,7 @@ def as_text(status: dict[str, Any]) -> str:
             *_processes(status),
             _profile(status),
             f"activity: {activity_words(status.get('activity'))}",
+            *_agents(status),
             _control(status),
             *_last_stop(status),
             _pose(status),
@@ -92,6 +93,14 @@ def _processes(status: dict[str, Any]) -> list[str]:
             lines.append(f"  {row['name']}: {row['reason']}")
         lines.extend(f"  alarm: {alarm}" for alarm in row["alarms"])
     return [*lines, f"no commands: {table['refusal']}"] if table["refusal"] else lines
+
+
+def _agents(status: dict[str, Any]) -> list[str]:
+    """Return for how long AI agents may command the robot, nothing while they may not."""
+    lease = status.get("agents")
+    if not lease or not lease["may_act"]:
+        return []
+    return [f"agents may give commands for {lease['left_s']:.0f} s, by {lease['granted_by']}"]
 
 
 def activity_words(document: Mapping[str, Any] | None) -> str:

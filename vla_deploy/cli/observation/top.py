@@ -23,8 +23,9 @@ from rich.text import Text
 from vla_deploy.cli.commands import add_top_command, number_within
 from vla_deploy.cli.observation.status import twin_words
 from vla_deploy.cli.session import RobotSession, attach
-from vla_deploy.cli.terminal import escaped_document, plain
+from vla_deploy.cli.terminal import plain
 from vla_deploy.client.battery import battery_words
+from vla_deploy.client.escaping import escaped_document
 from vla_deploy.ipc import TOPICS, PulseReader
 
 DOCUMENTS: Final = (

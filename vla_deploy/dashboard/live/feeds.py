@@ -35,7 +35,7 @@ FASTEST_S: Final = 0.1
 ON_CHANGE_S: Final = 0.5
 EVENTS_S: Final = 0.05
 DIGITS: Final = 4
-PERIODS_S: Final[Mapping[str, float]] = {"scan": 0.2}
+PERIODS_S: Final[Mapping[str, float]] = {"scan": 0.2, "live_obstacles": 0.2}
 """Topics that are sent less often than their rate and `FASTEST_S` allow."""
 TABLE_PERIOD_S: Final = 0.5
 WINDOW_S: Final = 4.0
@@ -50,16 +50,26 @@ _FOLLOW_NS: Final = NS_PER_S // 5
 class Packing:
     """Describe how packed fields become JSON: which fields, and how many digits.
 
-    `counted_by` names the field that has the number of used array entries.
+    `counted_by` names the field that has the number of used array entries, for all arrays or for
+    each.
     """
 
     fields: tuple[str, ...] = ()
     digits: int = DIGITS
-    counted_by: str = ""
+    counted_by: str | Mapping[str, str] = ""
 
 
 PACKINGS: Final[Mapping[str, Packing]] = {
     "joint_state": Packing(counted_by="joint_count"),
+    "live_obstacles": Packing(
+        digits=3,
+        counted_by={
+            **dict.fromkeys(("x_m", "y_m"), "count"),
+            **dict.fromkeys(
+                ("mover_x_m", "mover_y_m", "mover_vx_m_s", "mover_vy_m_s"), "mover_count"
+            ),
+        },
+    ),
     "near_obstacles": Packing(counted_by="count", digits=3),
     "scan": Packing(fields=("range_m",), digits=3),
 }
@@ -143,9 +153,11 @@ def unpacked(sample: Sample, topic: Topic[Any]) -> dict[str, Any]:
     """Return packed fields as JSON values: rounded, arrays cut to their used length."""
     packing = PACKINGS.get(topic.name, Packing())
     record = sample.data
-    used = int(record[packing.counted_by]) if packing.counted_by else None
     names = packing.fields or tuple(field.name for field in topic.fields)
-    return {name: _plain(record[name], packing.digits, used) for name in names}
+    counted = packing.counted_by
+    counts = dict.fromkeys(names, counted) if isinstance(counted, str) else counted
+    used = {name: int(record[counts[name]]) if counts.get(name) else None for name in names}
+    return {name: _plain(record[name], packing.digits, used[name]) for name in names}
 
 
 def _plain(value: Any, digits: int, used: int | None) -> Any:

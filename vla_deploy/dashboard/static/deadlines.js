@@ -11,6 +11,7 @@ const DEADLINES_S = {
   pose: 1.5,
   scan: 1.5,
   near_obstacles: 2,
+  live_obstacles: 2,
   scene: 3,
   camera: 3,
   executor_status: 2,

@@ -57,6 +57,18 @@ class UtteranceContent(TypedDict, total=False):
     heard: HeardEvidence
 
 
+class AgentLease(TypedDict):
+    """Permit agents to give commands from `granted_ns` until `until_ns` of the run's clock.
+
+    `granted_by` and `revoked_by` are persons; while nobody has taken it back, the latter is "".
+    """
+
+    granted_ns: int
+    until_ns: int
+    granted_by: str
+    revoked_by: str
+
+
 class Utterance(UtteranceContent):
     """Say also who speaks; answers carry the id."""
 

@@ -21,7 +21,7 @@ DEPTH_SIGMA_PER_M = 0.0012
 # Encoders and mounting of a head that stands still.
 AIM_SIGMA_RAD = 0.0005
 # How well stamps of images and joints agree: a camera that turns meanwhile looks elsewhere.
-STAMP_SIGMA_S = 0.004
+STAMP_SIGMA_S = 0.01
 SMOOTHING_PX = 3
 SPARSE_PX = 3
 UPRIGHT = 0.9

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any, Final
 
+from vla_deploy.client.agent_lease import is_agent
 from vla_deploy.client.command_record import MOST_CHARACTERS
 from vla_deploy.ipc import Event
 from vla_deploy.ipc.payloads.tasks import PlanMessage, TaskEvent, Utterance
@@ -61,6 +62,11 @@ class UserCommand:
     def may_have_been(self) -> tuple[str, ...]:
         """Return the other readings that are so likely that they count."""
         return tuple(text for text, odds in self.others if odds >= LEAST_INSTEAD)
+
+    @property
+    def is_of_agent(self) -> bool:
+        """Return whether an agent gave it."""
+        return is_agent(self.source)
 
     @property
     def is_spoken(self) -> bool:

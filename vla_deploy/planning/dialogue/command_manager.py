@@ -182,6 +182,11 @@ class CommandManager:
         return self._goes_on or self.dialogue.pending is not None
 
     @property
+    def carried_out(self) -> frozenset[str]:
+        """Return the commands whose plans the executor has, those of an earlier planner too."""
+        return frozenset(self._active.plans) | (self._situation.executing or frozenset())
+
+    @property
     def plans_carried_out(self) -> tuple[Plan, ...]:
         """Return the plans that the executor has, as far as this planner knows of them."""
         return tuple(self._active.plans.values())

@@ -34,6 +34,7 @@ from vla_deploy.planning.understanding import (
     judge_answer,
 )
 from vla_deploy.planning.understanding.conversation import ANSWER_LIMIT_S, mentions_of
+from vla_deploy.plans.agent_rules import NO_ORDERS
 from vla_deploy.plans.errors import PlanError, PlanInvalid
 from vla_deploy.plans.plan import Plan
 
@@ -131,6 +132,8 @@ class Dialogue:
                 self._situation.check_ready()
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["no back end was asked for a plan"])
+            if command.is_of_agent and answer.proposal and answer.proposal.order:
+                raise NO_ORDERS
             if not command.recovers:
                 self._situation.check_battery(answer.plan)
             self._events.check_length(answer.plan)
@@ -240,6 +243,12 @@ class Dialogue:
     def declines(self, text: object) -> bool:
         """Return whether words such as "never mind" mean the question, and not all that goes on."""
         return isinstance(text, str) and self.judge(text)[0] is AnswerVerdict.NO
+
+    @property
+    def waits_for_person(self) -> str:
+        """Return the question that is open, or that of a held plan; "" where nothing waits."""
+        waiting = self.pending or self.held
+        return "" if waiting is None else waiting.question.text
 
     def settle(self) -> PendingQuestion | None:
         """Wait no more, and return what waited; nothing that was chosen counts any more."""

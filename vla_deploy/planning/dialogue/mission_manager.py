@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.action_status import summary_of
-from vla_deploy.client.command_record import part_of
+from vla_deploy.client.command_record import MOST_CHARACTERS, part_of
 from vla_deploy.client.following import is_lost
 from vla_deploy.ipc import CellWriter, Event
 from vla_deploy.ipc.payloads.tasks import MissionsDocument, SaidEvent, TaskEvent
@@ -106,6 +106,15 @@ class MissionManager:
             raise CommandUnreadable(f"{MOST_OPEN} missions are open already; cancel one first")
         self._accept(command, found)
         return True
+
+    def are_several(self, text: str) -> bool:
+        """Return whether words are a mission, or faulty ones of one."""
+        if not text or len(text) > MOST_CHARACTERS:
+            return False
+        try:
+            return self._of_words(UserCommand(command_id="", told_ns=0, text=text)) is not None
+        except MissionInvalid:
+            return True
 
     def _of_words(self, command: UserCommand) -> Mission | None:
         if command.plan is not None or command.is_answer:

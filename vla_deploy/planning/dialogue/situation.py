@@ -16,12 +16,12 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.missions.criteria import Facts
 from vla_deploy.model_servers.calls.picture import Image
 from vla_deploy.navigation.path_planning import base_planner
-from vla_deploy.planning.dialogue.battery_rules import refusal_at_low
 from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.task_log import TaskLog
 from vla_deploy.planning.errors import BatteryLow, NotReadyToMove
 from vla_deploy.planning.interfaces import Aid, PlanRequest
 from vla_deploy.planning.understanding import Conversation
+from vla_deploy.plans.battery_rules import refusal_at_low
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.plans.plan import Plan
 from vla_deploy.robots import RobotDescription

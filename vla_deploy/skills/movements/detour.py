@@ -14,6 +14,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.navigation.errors import NoPath
 from vla_deploy.robots.floor_pose import Points, Pose2D
 from vla_deploy.skills.context import SkillContext, spoken
+from vla_deploy.skills.link import LiveView
 
 LOOK_M: Final = 2.5
 """As far along the way it is looked at: beyond, most will be seen better from nearer."""
@@ -53,22 +54,22 @@ class Detour:
         if len(moving) and self._waits():
             self.closed_by = "somebody is in the way"
             return False
-        return self._go_around(live.points, live.movers[:, :2], pose, blocking)
+        return self._go_around(live, pose, blocking, moving[:, :2])
 
     def _waits(self) -> bool:
         now_ns = self._context.link.working_ns()
         self._waits_since_ns = self._waits_since_ns or now_ns
         return now_ns - self._waits_since_ns < WAIT_S * NS_PER_S
 
-    def _go_around(self, points: Points, movers: Points, pose: Pose2D, blocking: Points) -> bool:
-        planner = self._context.planner.around(points, ASIDE_M)
-        if len(movers):
-            planner = planner.around(movers, ASIDE_OF_MOVERS_M)
+    def _go_around(self, live: LiveView, pose: Pose2D, blocking: Points, met: Points) -> bool:
+        planner = self._context.planner.around(live.points, ASIDE_M)
+        if len(live.movers):
+            planner = planner.around(live.movers[:, :2], ASIDE_OF_MOVERS_M)
         goal = self.way[-1]
         try:
             way = planner.plan((pose.x_m, pose.y_m), (float(goal[0]), float(goal[1])))
         except NoPath:
-            self.closed_by = f"the way is closed by {self._named(blocking)}"
+            self.closed_by = f"the way is closed by {self._named(blocking, met)}"
             return False
         self.way, self.closed_by = way, ""
         return True
@@ -83,8 +84,10 @@ class Detour:
         met = _near(at, ahead, reach_m) | _near(soon, ahead, reach_m)
         return movers[met | _near(at, blocking, NEAR_MOVER_M)]
 
-    def _named(self, blocking: Points) -> str:
-        link, middle = self._context.link, blocking.mean(axis=0) if len(blocking) else self.way[-1]
+    def _named(self, blocking: Points, met: Points) -> str:
+        if not len(blocking):  # then somebody is in it, or soon will be
+            return f"somebody{self._place_near(met[0])}"
+        link, middle = self._context.link, blocking.mean(axis=0)
         scene = link.snapshot()
         things = () if scene is None else scene.things
         known = [(math.dist(one.xy_m, middle), str(one)) for one in things]

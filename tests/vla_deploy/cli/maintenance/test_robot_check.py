@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
+from vla_deploy.ipc import topics
 from vla_deploy.robots import load_robot
+from vla_deploy.robots.camera import MOST_PIXELS
 from vla_deploy.robots.loader import ROBOTS_DIR
 
 
@@ -43,6 +45,14 @@ def test_all_that_does_not_fit_is_said_at_once(
     assert fault in said.err
     assert "reach.distances_m[1]: got 0.6, expected one that a hand gets to" in said.err
     assert f"vla-deploy robot reach --robot {mine}" in said.err
+
+
+def test_an_image_that_has_no_room_is_refused(vla: Callable[..., Any], mine: Path) -> None:
+    change(mine, ("width = 640", "width = 1280"), ("height = 480", "height = 720"))
+    said = vla("check", "--robot", mine)
+    assert said.code == 2
+    assert "camera.width, camera.height: got 1280 x 720, expected at most 307200" in said.err
+    assert topics.RGBD.slot_bytes == MOST_PIXELS * 5  # colour, and depth of two bytes
 
 
 def test_an_arm_without_a_reach_gets_one_that_check_accepts_and_a_person_measured(

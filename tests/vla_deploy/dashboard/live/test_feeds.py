@@ -87,6 +87,25 @@ def test_a_scan_is_told_in_millimetres_without_the_age_of_its_beams(
     assert data == {"range_m": [1.235] * 360}
 
 
+def test_what_is_not_on_the_map_is_told_with_who_moves(
+    feeds: Mapping[str, LiveFeed], space: SharedSpace, clock: ManualClock
+) -> None:
+    cell = space.cell_writer("live_obstacles")
+    cell.put(
+        count=2,
+        x_m=[1.0, 1.05],
+        y_m=[2.0, 2.0],
+        mover_count=1,
+        mover_x_m=[3.0],
+        mover_y_m=[4.0],
+        mover_vx_m_s=[0.5],
+        mover_vy_m_s=[0.0],
+    )
+    (message,) = feeds["live_obstacles"].look(now(clock))
+    data = told(message)["data"]
+    assert (data["x_m"], data["mover_x_m"], data["mover_vx_m_s"]) == ([1.0, 1.05], [3.0], [0.5])
+
+
 def test_events_begin_now_and_none_is_skipped(
     feeds: Mapping[str, LiveFeed], space: SharedSpace, clock: ManualClock
 ) -> None:

@@ -8,7 +8,7 @@ import { drawMap } from "./map_layers.js";
 import { centred, fitted, toMap, zoomed } from "./map_view.js";
 import { boundsOf, thingAt, worldOf } from "./map_world.js";
 
-const TOPICS = ["pose", "scan", "scene", "path", "control_status"];
+const TOPICS = ["pose", "scan", "scene", "path", "control_status", "live_obstacles"];
 const MOST_HZ = 15;
 const PICK_PX = 14;
 const NEAR_PX_PER_M = 90;

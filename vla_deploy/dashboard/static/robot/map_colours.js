@@ -12,6 +12,7 @@ export const MAP_COLOURS = {
   driven: "--map-driven",
   planned: "--accent",
   scan: "--map-scan",
+  obstacle: "--map-obstacle",
   zone: "--map-zone",
   zoneActive: "--bad",
   robot: "--accent",

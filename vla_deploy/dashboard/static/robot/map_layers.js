@@ -11,6 +11,8 @@ import { doubtEllipse, fromBase, gridStep, toMap, toScreen } from "./map_view.js
 const TURN = 2 * Math.PI;
 const LEAST_ARROW_PX = 9;
 const SCAN_DOT_PX = 1.6;
+const OBSTACLE_CELL_M = 0.05; // as the robot keeps them
+const MOVER_RADIUS_M = 0.3;
 const LABEL_ABOVE_PX_PER_M = 45;
 const FONT = "12px system-ui, sans-serif";
 
@@ -22,6 +24,7 @@ export const LAYERS = [
   { name: "surfaces", words: "Surfaces", draw: drawSurfaces },
   { name: "places", words: "Places", draw: drawPlaces },
   { name: "path", words: "Path", draw: drawPath },
+  { name: "obstacles", words: "Not on the map", draw: drawObstacles },
   { name: "scan", words: "Lidar", draw: drawScan },
   { name: "zones", words: "Zones", draw: drawZones },
   { name: "robot", words: "Robot", draw: drawRobot },
@@ -108,6 +111,24 @@ function drawPath(pen, { path }) {
   context.beginPath();
   context.arc(x, y, 6, 0, TURN);
   context.stroke();
+}
+
+/** What stands beside the map, in cells; who walks, with the way of the next second. */
+function drawObstacles(pen, { obstacles }) {
+  if (!obstacles) return;
+  const { context, view, size, colours } = pen;
+  const side = Math.max(OBSTACLE_CELL_M * view.px_per_m, 2);
+  context.fillStyle = colours.obstacle;
+  obstacles.x_m.forEach((x_m, index) => {
+    const [x, y] = toScreen(view, size, [x_m, obstacles.y_m[index]]);
+    context.fillRect(x - side / 2, y - side / 2, side, side);
+  });
+  obstacles.mover_x_m.forEach((x_m, index) => {
+    const at = [x_m, obstacles.mover_y_m[index]];
+    const next = [at[0] + obstacles.mover_vx_m_s[index], at[1] + obstacles.mover_vy_m_s[index]];
+    circle(pen, at, MOVER_RADIUS_M, colours.obstacle);
+    line(pen, [at, next], colours.obstacle, 2, []);
+  });
 }
 
 function drawScan({ context, view, size, colours }, { pose, scan }) {

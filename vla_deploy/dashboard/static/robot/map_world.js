@@ -18,6 +18,7 @@ export function worldOf({ samples, isStale, model, grid, plan, selected }) {
     pose: pose && { ...pose, state: old ? "lost" : pose.state },
     scan: old ? null : fresh("scan"),
     path: fresh("path"),
+    obstacles: fresh("live_obstacles"),
     zones: zonesOf(model, fresh("control_status")),
     footprint_m: model?.footprint_m,
     surfaces: scene?.surfaces ?? [],

@@ -1,5 +1,6 @@
 /** Type or say a command, watch its plan, answer, cancel, look back. */
 
+import { AgentsCard } from "../command/agents_card.js";
 import { CommandCard } from "../command/command_card.js";
 import { Composer } from "../command/composer.js";
 import { History } from "../command/history.js";
@@ -27,6 +28,7 @@ export function View() {
         <${Composer} />
         ${shown && !isMission && html`<${CommandCard} command=${shown} title=${shown === open ? "Under way" : "Command"} />`}
         <${MissionsCard} shown=${missions} commands=${commands} chosen=${shown?.command_id} />
+        <${AgentsCard} />
       </div>
       <${History} commands=${all} chosen=${shown?.command_id} onChoose=${setChosen} />
     </div>

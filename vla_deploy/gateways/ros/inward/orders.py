@@ -8,7 +8,7 @@ from typing import Any, Final
 from vla_deploy.client.command_record import part_of
 from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
 from vla_deploy.client.link import RobotLink
-from vla_deploy.gateways.ros.inward.words import OrderInvalid
+from vla_deploy.gateways.words import OrderInvalid
 from vla_deploy.ipc import topics
 from vla_deploy.ipc.errors import BadPayload
 from vla_deploy.ipc.payloads.tasks import TaskEvent, UtteranceContent

@@ -24,8 +24,8 @@ from vla_deploy.gateways.ros.inward.orders import (
     error_of,
     words_of,
 )
-from vla_deploy.gateways.ros.inward.words import OrderInvalid, is_mission, parsed_plan, shown
 from vla_deploy.gateways.ros.part import Gateway
+from vla_deploy.gateways.words import OrderInvalid, is_mission, parsed_plan, shown
 from vla_deploy.ipc.payloads.tasks import TaskEvent
 
 Result: Final = ExecutePlan.Result

@@ -14,14 +14,14 @@ from std_msgs.msg import String
 
 from vla_deploy.gateways.ros.graph import NODE_NAME, PUBLISHED_BY
 from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders
-from vla_deploy.gateways.ros.inward.words import (
+from vla_deploy.gateways.ros.part import Gateway, GatewayPart
+from vla_deploy.gateways.words import (
     OrderInvalid,
     checked_text,
     is_stop_word,
     read_message,
     shown,
 )
-from vla_deploy.gateways.ros.part import Gateway, GatewayPart
 from vla_deploy.ipc.announcer import Announcer
 
 COMMAND_TOPICS: Final[Mapping[str, str]] = {

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.payloads.supervision import BatteryDocument
-from vla_deploy.planning.dialogue.battery_rules import (
+from vla_deploy.plans.battery_rules import (
     AGAIN_NS,
     BatteryAct,
     RobotNow,

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from vla_deploy.gateways.ros.inward.words import (
+from vla_deploy.gateways.words import (
     OrderInvalid,
     is_mission,
     is_stop_word,
