@@ -8,7 +8,7 @@ from typing import Final
 
 from sim_twin.harness.processes import ProcessStack
 from sim_twin.harness.robot import RobotFailed
-from sim_twin.harness.stop_witness import NoStop, StopWitness
+from sim_twin.harness.stop_witness import ANSWER_S, NoStop, StopWitness
 
 _PATHS: Final = {"page": "/api/v1/stop", "door": "/stop"}
 _NS_PER_MS: Final = 1e6
@@ -45,21 +45,23 @@ class StopPresser:
         pressed = (self._press(doors) for _ in range(count) if goes_on())
         return [time_ms for time_ms in pressed if time_ms is not None]
 
-    def timed(self, press: Callable[[ExitStack], object]) -> float | None:
+    def timed(
+        self, press: Callable[[ExitStack], object], answer_s: float = ANSWER_S
+    ) -> float | None:
         """Return how long a press took to the wire, in ms; what it opens closes after that.
 
         The busy machine itself may stop the robot before, or keep it from being armed again: then
         nothing is pressed, and None is returned.
 
         Raises:
-            NoStop: the press had no effect.
+            NoStop: the press had no effect within `answer_s`.
         """
         if not self._is_armed() or not self._witness.operates():
             return None
         with ExitStack() as opened:
             asked_ns = self.robot.clock.now_ns()
             press(opened)
-            time_ms = (self._witness.stop_frame_ns() - asked_ns) / _NS_PER_MS
+            time_ms = (self._witness.stop_frame_ns(answer_s) - asked_ns) / _NS_PER_MS
             self.robot.await_change("armed")
         return time_ms
 

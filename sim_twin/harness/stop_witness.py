@@ -40,20 +40,20 @@ class StopWitness:
                 operates = _lets_operate(frame)
         return operates
 
-    def stop_frame_ns(self) -> int:
+    def stop_frame_ns(self, answer_s: float = ANSWER_S) -> int:
         """Return when the drive is first told anything but to operate.
 
         Raises:
-            NoStop: that does not come within `ANSWER_S`.
+            NoStop: that does not come within `answer_s`.
         """
-        deadline_ns = self._clock.now_ns() + round(ANSWER_S * NS_PER_S)
+        deadline_ns = self._clock.now_ns() + round(answer_s * NS_PER_S)
         while self._clock.now_ns() < deadline_ns:
-            frame = self._bus.recv(ANSWER_S)
+            frame = self._bus.recv(answer_s)
             if frame is None or frame.arbitration_id != self._cob_id:
                 continue
             if not _lets_operate(frame):
                 return self._clock.now_ns()
-        raise NoStop(f"no stop on the wire within {ANSWER_S:g} s of the request")
+        raise NoStop(f"no stop on the wire within {answer_s:g} s of the request")
 
     def close(self) -> None:
         """Leave the bus."""
