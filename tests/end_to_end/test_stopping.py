@@ -47,6 +47,9 @@ def test_stop_cancels_a_drive_and_leaves_the_robot_ready(coarse_stack: LockstepS
     assert outcome is not None
     assert not outcome["success"]
     assert [action["status"] for action in outcome["actions"]] == ["cancelled"]
+    assert stack.lockstep.run_until(
+        lambda: stack.status()["last_stop"]["state"] == "verified", 0.5
+    ), stack.status()["last_stop"]
     assert stack.status()["state"] == "armed"
     assert stack.say("turn left 20 degrees")["success"]
 
