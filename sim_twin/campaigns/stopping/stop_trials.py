@@ -41,7 +41,7 @@ _SENSES_S: Final = 1.0
 _POSE_S: Final = 3.0
 _DRIVE_M_S: Final = 0.3
 _ARM_RATIO: Final[Mapping[HandLoad, float]] = {HandLoad.EMPTY: 0.7, HandLoad.CARRYING: 0.3}
-_PLACE_RATIO: Final = 0.15
+_PLACE_RATIO: Final = 0.25
 """Of the joints' top speed: how an arm lets down what it holds."""
 _TABLE_AGE_S: Final = topics.PROCESS_TABLE.deadline_s
 _TABLE: Final = cast("ProcessTable", {"processes": []})
@@ -167,8 +167,16 @@ class StopTrials:
             joint_rad=joint_rad,
             residual_rad_s=residual_rad_s,
             proof=state,
-            failures=tuple(self._failures(rest_s, noticed_s, proof)),
+            failures=(
+                *self._motionless(moving_rad_s),
+                *self._failures(rest_s, noticed_s, proof),
+            ),
         )
+
+    def _motionless(self, moving_rad_s: float) -> Iterator[str]:
+        """Yield that the stop says nothing, since nothing moved that was to move."""
+        if self._cell.phase is not StopPhase.STANDING and moving_rad_s <= STANDSTILL_RAD_S:
+            yield f"nothing moved at the request: {moving_rad_s:.3f} rad/s"
 
     def _failures(self, rest_s: float, noticed_s: float, proof: Mapping[str, Any]) -> Iterator[str]:
         rule = SOURCES[self._cell.source]
