@@ -76,7 +76,7 @@ def test_a_page_whose_server_hangs_shows_no_value_as_live_and_still_stops(
         expect(page.get_by_text("No live data for")).to_be_visible()
     finally:
         robot.thaw("dashboard")
-    expect(safety(page)).to_contain_text("Emergency stop")
+    expect(safety(page)).to_contain_text("Emergency stop latched")
     expect(page.get_by_text("No live data for")).to_be_hidden()
 
 
@@ -86,5 +86,5 @@ def test_a_viewer_may_stop_and_nothing_else(pages: Any, robot: ProcessStack) -> 
     expect(disarm).to_be_disabled()
     expect(disarm).to_have_attribute("title", "Needs the role operator")
     page.get_by_role("button", name="Stop", exact=True).click()
-    expect(safety(page)).to_contain_text("Emergency stop")
+    expect(safety(page)).to_contain_text("Emergency stop latched")
     assert robot.state() in ("stopping", "stopped")
