@@ -380,7 +380,7 @@ STOP = b"POST /api/v1/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\
 
 
 def test_a_stop_is_pressed_before_what_waits_before_it_and_where_there_is_no_room(world):
-    entered, goes_on, reasons = threading.Event(), threading.Event(), queue.Queue()
+    entered, goes_on, reasons = queue.Queue(), threading.Event(), queue.Queue()
     app = FastAPI()
 
     def press(reason):
@@ -389,16 +389,17 @@ def test_a_stop_is_pressed_before_what_waits_before_it_and_where_there_is_no_roo
 
     @app.get("/slow")
     async def slow() -> None:
-        entered.set()
+        entered.put("/slow")
         await asyncio.to_thread(goes_on.wait)
 
     bounds = Connections(LIMITS)
-    with serving(app, socket.socket(), bounds, press=press) as port:
+    with serving(app, socket.socket(), bounds, press=press) as port, contextlib.ExitStack() as end:
         robot = Robot(port, bounds, None)
+        end.callback(goes_on.set)
         with robot.call() as one, robot.call() as other:
             for called in (one, other):
                 called.sendall(b"GET /slow HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-            assert entered.wait(10)
+                entered.get(timeout=10)  # before that it is idle, and would give way
             robot.until_held(2)
             one.sendall(STOP)  # on a connection that waits for an answer
             assert reasons.get(timeout=10) == ""
