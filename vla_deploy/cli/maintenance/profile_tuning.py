@@ -7,13 +7,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from drivers.clock import MonotonicClock
 from drivers.twin_clock import TwinClock
 from platforms import Profile, load_profile
-from platforms.board import identify
 from platforms.profile import profile_from, profile_names
 from platforms.profile_source import ProfileSource, merged, read_source
-from vla_deploy.cli.commands import add_command, emit
+from vla_deploy.cli.commands import add_command, emit, number_above_zero, number_within
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import FRESH_S, RobotSession, attach, base_of
 from vla_deploy.inference.errors import InferenceError
@@ -51,12 +52,14 @@ def register(acts: Any) -> None:
     )  # fmt: skip
     for command, minutes in ((measure, 1.0), (tune, 3.0)):
         command.add_argument(
-            "--minutes", type=float, default=minutes, help=f"how long to look (default {minutes:g})"
-        )
+            "--minutes", type=number_above_zero("minutes"), default=minutes,
+            help=f"how long to look (default {minutes:g})",
+        )  # fmt: skip
     tune.add_argument("--out", type=Path, required=True, metavar="FILE", help="a new .toml")
     tune.add_argument(
-        "--margin", type=float, default=0.25, help="of the computer that stays free (default 0.25)"
-    )
+        "--margin", type=number_within(0.0, 0.99, "a share from 0 to 0.99"), default=0.25,
+        help="of the computer that stays free (default 0.25)",
+    )  # fmt: skip
     tune.add_argument(
         "--mode", type=TuningMode, choices=tuple(TuningMode), default=TuningMode.BALANCED,
         help="what to spare (default: balanced)",
@@ -79,13 +82,11 @@ def tune_profile(arguments: argparse.Namespace) -> int:
 
     Raises:
         CommandFailed: no rates fit this computer, or the file cannot be written.
-        UsageError: the file is no new .toml, or the margin is none.
+        UsageError: the file is no new .toml.
     """
     out: Path = arguments.out
     if out.suffix != ".toml" or out.exists() or not out.absolute().parent.is_dir():
         raise UsageError(f"--out {out}: expected a new file that ends in .toml, in a folder")
-    if not 0.0 <= arguments.margin < 1.0:
-        raise UsageError(f"--margin {arguments.margin:g}: expected 0 to below 1")
     session = attach(arguments.runtime_base)
     try:
         source = read_source(_profile_of(session))
@@ -122,9 +123,8 @@ def tune_profile(arguments: argparse.Namespace) -> int:
 
 def this_computer() -> Computer:
     """Return the cores and the memory that this process may use."""
-    page_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    memory_bytes = identify().memory_bytes or page_bytes
-    return Computer(cpu_count=len(os.sched_getaffinity(0)), memory_mb=memory_bytes / _MB)
+    memory_mb = psutil.virtual_memory().total / _MB
+    return Computer(cpu_count=len(os.sched_getaffinity(0)), memory_mb=memory_mb)
 
 
 def _profile_of(session: RobotSession) -> str:

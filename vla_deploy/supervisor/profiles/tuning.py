@@ -246,7 +246,6 @@ def _budgets(
         names = [name for name in draft.values["budgets"] if name not in ("total", STAND_IN)]
         # A budget wants the whole margin above what was used, and has at least half of it.
         needed = {name: max(least, used.get(name, 0.0) * (1.0 + margin / 2)) for name in names}
-        wanted = {name: used.get(name, 0.0) * (1.0 + margin) for name in names}
         spare = there - sum(needed.values())
         if spare < 0.0:
             raise ProfileDoesNotFit(
@@ -255,7 +254,9 @@ def _budgets(
                 "smaller model or a smaller --margin"
             )
         allowed = {
-            name: max(needed[name], wanted[name], draft.get(f"budgets.{name}.{key}"))
+            name: max(
+                least, used.get(name, 0.0) * (1.0 + margin), draft.get(f"budgets.{name}.{key}")
+            )
             for name in names
         }
         asked = sum(allowed.values()) - sum(needed.values())
