@@ -15,6 +15,7 @@ import torch
 import vla_deploy
 from training.mean_weights import mean_of
 from training.planner.files import GRAPH, MEAN_OF, TOKENIZER
+from training.planner.network import deepened, layers_of
 from training.planner.training import WEIGHTS
 
 SHIPPED: Final = Path(vla_deploy.__file__).parent / "models" / "command_parser"
@@ -24,13 +25,18 @@ NEW_SHARE: Final = 0.75
 def mean(out: Path, earlier: Path, into: Path) -> None:
     """Write the mean of the weights under `out` and `earlier`, with the tokenizer, under `into`.
 
+    An earlier one of fewer layers is deepened first, as it was when the later training began.
+
     Raises:
         FileNotFoundError: one of them has not been trained.
         ValueError: they are not of one shape, or have not one tokenizer.
     """
     if (out / TOKENIZER).read_bytes() != (earlier / TOKENIZER).read_bytes():
         raise ValueError(f"{out} and {earlier} have not the same {TOKENIZER}: none began from one")
-    weights = mean_of(earlier / WEIGHTS, out / WEIGHTS, NEW_SHARE)
+    before, after = (torch.load(one / WEIGHTS, weights_only=True) for one in (earlier, out))
+    if layers_of(before) < layers_of(after):
+        before = deepened(before, after)
+    weights = mean_of(before, after, NEW_SHARE)
     into.mkdir(parents=True, exist_ok=True)
     shutil.copy(out / TOKENIZER, into / TOKENIZER)
     torch.save(weights, into / WEIGHTS)

@@ -1,5 +1,7 @@
 """Define the decoder: a Llama of small size, with tied embeddings."""
 
+from collections.abc import Mapping
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -84,6 +86,38 @@ class PlanDecoder(nn.Module):
     def scores(self, values: Tensor) -> Tensor:
         """Return a score for each token of the vocabulary."""
         return functional.linear(values, self.embedding.weight)
+
+
+def deepened(weights: Mapping[str, Tensor], into: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Return weights of a deeper network, that of `into`, which says what `weights` say.
+
+    Each layer of theirs is followed by as many of `into`, which add nothing to the sum until they
+    learn to (Chen et al., "Net2Net", 2016).
+
+    Raises:
+        ValueError: `into` has not a multiple of their layers.
+    """
+    layers, given = layers_of(into), layers_of(weights)
+    times, rest = divmod(layers, given)
+    if rest or not times:
+        raise ValueError(f"expected a multiple of {given} layers, got {layers}")
+    deeper = dict(into)
+    for name in deeper:
+        parts = name.split(".")
+        if parts[0] != "layers":
+            deeper[name] = weights[name]
+            continue
+        layer, new = divmod(int(parts[1]), times)
+        if not new:
+            deeper[name] = weights[".".join((parts[0], str(layer), *parts[2:]))]
+        elif parts[2] in ("out", "down"):
+            deeper[name] = torch.zeros_like(deeper[name])
+    return deeper
+
+
+def layers_of(weights: Mapping[str, Tensor]) -> int:
+    """Return how many layers a network has."""
+    return len({name.split(".")[1] for name in weights if name.startswith("layers.")})
 
 
 def angles(shape: NetworkShape, tokens: int) -> tuple[Tensor, Tensor]:

@@ -60,4 +60,13 @@ SIZES: Final[Mapping[str, PlannerSettings]] = {
     "long": PlannerSettings(name="long", budget_s=14_400.0),
     # For going on from a training that is finished: smaller steps.
     "more": PlannerSettings(name="more", budget_s=4500.0, rate=1.2e-3, matrix_rate=0.009, seed=7),
+    # Twice as many layers, on the weights of a finished training of one of the sizes above.
+    "deep": PlannerSettings(
+        name="deep",
+        budget_s=6300.0,
+        shape=NetworkShape(layers=8),
+        rate=1.5e-3,
+        matrix_rate=0.012,
+        seed=8,
+    ),
 }

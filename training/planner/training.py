@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from training.planner.files import TOKENIZER
-from training.planner.network import PlanDecoder
+from training.planner.network import PlanDecoder, deepened
 from training.planner.sentences.composing import Composer, Example
 from training.planner.settings import PlannerSettings
 from training.planner.tokens import END, PAD, load_tokenizer, prompt_of, train_tokenizer
@@ -116,14 +116,15 @@ def train(
 ) -> PlanDecoder:
     """Train until the time is spent, and write the weights; return the network.
 
-    `start_from` is the folder of a finished training of the same shape, whose weights and tokens
-    this one begins with.
+    `start_from` is the folder of a finished training of the same shape, or one of fewer layers,
+    whose weights and tokens this one begins with.
     """
     out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(settings.seed)
     network = PlanDecoder(settings.shape)
     if start_from is not None:
-        network.load_state_dict(torch.load(start_from / WEIGHTS, weights_only=True))
+        earlier = torch.load(start_from / WEIGHTS, weights_only=True)
+        network.load_state_dict(deepened(earlier, network.state_dict()))
         shutil.copyfile(start_from / TOKENIZER, out / TOKENIZER)
     tokenizer = tokenizer_in(out, chatter)
     course = Course(network, optimizers_of(network, settings), settings)

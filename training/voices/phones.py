@@ -15,6 +15,8 @@ PHONES: Final = (
 )  # fmt: skip
 NUMBERS: Final[Mapping[str, int]] = {phone: number for number, phone in enumerate(PHONES)}
 
+STRESS: Final = "',%="
+"""eSpeak NG, docs/phonemes.md: primary, secondary, diminished, and of the word before."""
 ESPEAK: Final[Mapping[str, str]] = {
     "_": SILENCE, "_:": SILENCE, "_|": SILENCE, "_!": SILENCE,
     "0": "aa", "A:": "aa", "A@": "aa", "aa": "ae", "a": "ae", "a#": "ax", "V": "ah", "VR": "er",
@@ -30,8 +32,11 @@ ESPEAK: Final[Mapping[str, str]] = {
 
 
 def from_espeak(name: str) -> str | None:
-    """Return the phone for a mnemonic of eSpeak, None for marks that are no sound."""
-    return ESPEAK.get(name)
+    """Return the phone for a mnemonic of eSpeak, None for marks that are no sound.
+
+    From 1.52 on a vowel's stress stands before it.
+    """
+    return ESPEAK.get(name.lstrip(STRESS))
 
 
 def from_dictionary(name: str) -> str | None:

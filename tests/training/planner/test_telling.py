@@ -18,6 +18,8 @@ from training.planner.sentences.telling import (
 def test_a_line_gives_steps_words_and_marks() -> None:
     frame = read_frame('put how="next to" | Well, {what:thing} goes by {where} – thanks!')
     assert frame.steps == ({"do": "put", "how": "next to"},)
+    several = read_frame('move way=forward by="half a metre" | half a metre on')
+    assert several.steps == ({"do": "move", "way": "forward", "by": "half a metre"},)
     words = [part for part in frame.parts if isinstance(part, str)]
     marks = [(one.slot.field, one.slot.source) for one in frame.parts if isinstance(one, Mark)]
     assert words == ["well", "goes", "by", "thanks"]

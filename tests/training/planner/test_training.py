@@ -12,8 +12,9 @@ torch = pytest.importorskip("torch")
 from training.planner.export import export  # noqa: E402
 from training.planner.files import MEAN_OF, TOKENIZER  # noqa: E402
 from training.planner.going_on import NEW_SHARE, mean  # noqa: E402
+from training.planner.network import PlanDecoder, deepened  # noqa: E402
 from training.planner.sentences.composing import Composer  # noqa: E402
-from training.planner.settings import SIZES  # noqa: E402
+from training.planner.settings import SIZES, NetworkShape  # noqa: E402
 from training.planner.training import train  # noqa: E402
 from vla_deploy.inference.language_model import LanguageModel  # noqa: E402
 from vla_deploy.inference.manifest import Language, LanguageUse  # noqa: E402
@@ -63,3 +64,14 @@ def test_of_trainings_with_other_tokenizers_there_is_no_mean(tmp_path: Path) -> 
     new, old = _trained(tmp_path / "new", 1.0), _trained(tmp_path / "old", 0.0, '{"a": 1}')
     with pytest.raises(ValueError, match=TOKENIZER):
         mean(new, old, tmp_path / "m")
+
+
+def test_a_deeper_network_begins_where_the_finished_one_ended() -> None:
+    shallow = PlanDecoder(NetworkShape(width=32, layers=2, heads=2, inner=64))
+    shape = NetworkShape(width=32, layers=6, heads=2, inner=64)
+    deep = PlanDecoder(shape)
+    deep.load_state_dict(deepened(shallow.state_dict(), deep.state_dict()))
+    tokens = torch.tensor([[5, 9, 1, 700]])
+    assert torch.allclose(deep(tokens), shallow(tokens), atol=1e-5)
+    with pytest.raises(ValueError, match="expected a multiple of 4 layers, got 6"):
+        deepened(PlanDecoder(NetworkShape(layers=4)).state_dict(), deep.state_dict())

@@ -32,7 +32,7 @@ KEPT_BACK_OF: Final = 10
 """One line of so many is kept back, to judge by."""
 _SLOT: Final = re.compile(r"\{(?:(\d)\.)?([a-z]+)(?::([a-z]+))?\}")
 _STEP: Final = re.compile(r'([a-z]+)((?: [a-z]+=(?:"[a-z ]+"|[a-z]+))*)')
-_CLOSED: Final = re.compile(r' ([a-z]+)="?([a-z ]*[a-z])"?')
+_CLOSED: Final = re.compile(r' ([a-z]+)=(?:"([a-z ]+)"|([a-z]+))')
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,8 @@ def _step(text: str, line: str) -> Mapping[str, str]:
     match = _STEP.fullmatch(text)
     if match is None or match[1] not in STEPS:
         raise PatternInvalid(f"{line!r}: {text!r} is no step; known: {', '.join(STEPS)}")
-    return {"do": match[1], **dict(_CLOSED.findall(match[2]))}
+    fields = _CLOSED.findall(match[2])
+    return {"do": match[1], **{name: quoted or plain for name, quoted, plain in fields}}
 
 
 def _parts(text: str) -> Iterator[str | Mark]:

@@ -165,12 +165,16 @@ def test_what_has_failed_before_is_left_to_who_can_tell_what_is_left(parser: Com
         "!!!",
         "word " * 80,
         "make me a sandwich",
-        "don't touch the bottle",
     ],
 )
 def test_other_talk_gives_no_plan(parser: CommandParser, text: str) -> None:
     with pytest.raises(PlanError):
         parser.propose(request(text), soon())
+
+
+def test_what_is_not_to_be_touched_is_a_standing_order(parser: CommandParser) -> None:
+    order = parser.propose(request("don't touch the bottle"), soon()).order
+    assert order is not None and order.forbids
 
 
 def test_the_same_words_give_the_same_answer(parser: CommandParser) -> None:
