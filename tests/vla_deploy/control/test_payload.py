@@ -13,6 +13,8 @@ from vla_deploy.robots import load_robot
 
 ROBOT = load_robot("butler")
 GRIPPER = ROBOT.joint_index["left_gripper"]
+SHORT = SHORT_OF_GOAL_M / ROBOT.hands["left"].opening_ratio
+PRESS = PRESS_M / ROBOT.hands["left"].opening_ratio
 
 
 @pytest.fixture
@@ -58,20 +60,31 @@ def test_a_hand_that_begins_anew_goes_on_pressing_on_what_it_holds(
     assert payload.pressed(position, idle).tolist() == position.tolist()
     told(space, left="cup", right=None)
     begin = payload.pressed(position, idle)
-    assert begin[GRIPPER] == pytest.approx(0.02 - PRESS_M)
+    assert begin[GRIPPER] == pytest.approx(0.02 - PRESS)
     assert np.delete(begin, GRIPPER).tolist() == np.delete(position, GRIPPER).tolist()
-    nearly_closed = np.full_like(position, ROBOT.position_min[GRIPPER] + 0.5 * PRESS_M)
+    nearly_closed = np.full_like(position, ROBOT.position_min[GRIPPER] + 0.5 * PRESS)
     assert payload.pressed(nearly_closed, idle)[GRIPPER] == ROBOT.position_min[GRIPPER]
 
 
 def test_a_robot_that_was_just_started_feels_what_its_hand_presses_on(payload: Payload) -> None:
     position, effort = np.full(len(ROBOT.joint_names), 0.02), np.zeros(len(ROBOT.joint_names))
     effort[GRIPPER] = -2 * PRESSING_RATIO
-    assert payload.pressed(position, effort)[GRIPPER] == pytest.approx(0.02 - PRESS_M)
+    assert payload.pressed(position, effort)[GRIPPER] == pytest.approx(0.02 - PRESS)
     effort[GRIPPER] = -0.5 * PRESSING_RATIO
     assert payload.pressed(position, effort)[GRIPPER] == 0.02
     effort[GRIPPER] = 2 * PRESSING_RATIO  # opening is no holding
     assert payload.pressed(position, effort)[GRIPPER] == 0.02
+
+
+def test_a_jaw_on_a_hinge_presses_as_far_between_its_pads_as_fingers_do(space: SharedSpace) -> None:
+    koch = load_robot("koch_v1_1")
+    (hand,) = koch.hands.values()
+    payload = Payload(koch, space.cell_reader("executor_status"))
+    told(space, hand="block")
+    position = np.full(len(koch.joint_names), 0.5)
+    begin = payload.pressed(position, np.zeros_like(position))[koch.joint_index["gripper"]]
+    assert hand.opening_m(0.5) - hand.opening_m(begin) == pytest.approx(PRESS_M)
+    payload.close()
 
 
 def test_a_hand_that_the_robot_does_not_have_is_not_held(
@@ -85,12 +98,12 @@ def test_a_hand_that_the_robot_does_not_have_is_not_held(
 def test_fingers_that_press_short_of_their_goal_hold_something(
     payload: Payload, effort: float
 ) -> None:
-    assert felt(payload, short_m=2 * SHORT_OF_GOAL_M, effort=effort) == {"left"}
+    assert felt(payload, short_m=2 * SHORT, effort=effort) == {"left"}
 
 
 @pytest.mark.parametrize(
     ("short_m", "effort", "torque"),
-    [(0.5 * SHORT_OF_GOAL_M, 0.5, True), (0.01, 0.5 * PRESSING_RATIO, True), (0.01, 0.5, False)],
+    [(0.5 * SHORT, 0.5, True), (0.01, 0.5 * PRESSING_RATIO, True), (0.01, 0.5, False)],
 )
 def test_fingers_that_do_not_press_hold_nothing(
     payload: Payload, short_m: float, effort: float, torque: bool

@@ -15,8 +15,10 @@ from vla_deploy.ipc import CellReader, Sample, SharedSpace, topics
 from vla_deploy.ipc.payloads.supervision import BudgetStop
 from vla_deploy.safety import SafetyInputs, Surroundings
 
-BASE_COMMANDS = (topics.BASE_COMMAND, topics.REMOTE_BASE_COMMAND)
-REMOTE = topics.REMOTE_BASE_COMMAND.name
+_DATED = (topics.REMOTE_BASE_COMMAND, topics.HAND_BASE_COMMAND)
+"""Wishes that say how long they hold."""
+BASE_COMMANDS = (topics.BASE_COMMAND, *_DATED)
+_DATED_NAMES = frozenset(one.name for one in _DATED)
 _OVER_S = 1.0
 _NO_REASON = "a budget is exhausted"
 
@@ -109,7 +111,7 @@ class InputCollector:
         )
 
     def _newest_base_command(self) -> Sample | None:
-        """Return the younger wish: one that moves the base holds its claim, and goes on telling."""
+        """Return the youngest wish: who moves the base holds its claim, and goes on telling."""
         newest = None
         for command in self._base_commands:
             sample = command.latest()
@@ -141,7 +143,7 @@ class InputCollector:
 def _age_s(command: Sample, now_ns: int) -> float:
     """Return how old a wish is; one that has outlived what it says of itself is too old."""
     age_s = command.age_s(now_ns)
-    is_over = command.topic == REMOTE and age_s > float(command.data["valid_s"])
+    is_over = command.topic in _DATED_NAMES and age_s > float(command.data["valid_s"])
     return max(age_s, _OVER_S) if is_over else age_s
 
 

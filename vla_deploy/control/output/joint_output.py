@@ -20,6 +20,8 @@ EASED_RATIO: Final = 0.5
 # Of the joint's top speed: slower than what counts as motion while the robot has to stand.
 EASING_RATIO: Final = 0.05
 UNWINDING_RATIO: Final = 0.3
+HELD_TICKS: Final = 3
+"""So long a joint may be unheard before its goal stands: it may hear what it does not answer."""
 
 
 class JointOutput:
@@ -42,6 +44,7 @@ class JointOutput:
         ]
         self._full_error = full_duty_error(robot)
         self._silent = np.zeros(len(robot.joint_names), dtype=np.bool_)
+        self._answered_to = np.full(len(robot.joint_names), np.nan)
 
     @property
     def sent(self) -> Floats:
@@ -59,21 +62,29 @@ class JointOutput:
         loose = ~state.torque_on | (state.watchdog < 0)
         if any_of(loose):
             self.place(loose)
-        ended = self._take_back()
+        ended = self._take_back(period_s)
         ended += self.motions.advance(period_s)
-        sent = self._gate.limit(self.motions.state.position, period_s)
+        setpoint, unheard = self.motions.state.position, state.age_s > HELD_TICKS * period_s
+        if any_of(unheard):
+            setpoint = np.where(unheard, self.sent, setpoint)
+        sent = self._gate.limit(setpoint, period_s)
         if any_of(state.torque_on):
             self._servos.write(sent + self._gravity.at(sent))
         return ended
 
-    def _take_back(self) -> list[MotionResult]:
+    def _take_back(self, period_s: float) -> list[MotionResult]:
         """Let joints that were silent, and have missed their goals, begin where they are.
 
-        What they were to do meanwhile is over, and with it every motion.
+        What they were to do meanwhile is over, and with it every motion. One whose setpoint stood
+        has missed none: begun anew at every answer of a loose plug, it would sag a bit each time.
         """
-        silent = self._servos.state.age_s > SILENT_S
+        age_s = self._servos.state.age_s
+        silent = age_s > SILENT_S
         back: Flags = self._silent & ~silent
+        if any_of(back):
+            back &= self.motions.state.position != self._answered_to
         self._silent = silent
+        np.copyto(self._answered_to, self.motions.state.position, where=age_s < period_s)
         if not any_of(back):
             return []
         self.place(back)

@@ -10,10 +10,10 @@ from vla_deploy.ipc.payloads.tasks import ExecutorStatus
 from vla_deploy.robots import RobotDescription
 
 # An empty gripper closes to where it was sent; fingers on an object stop short of it, pressing.
-SHORT_OF_GOAL_M: Final = 0.001
+SHORT_OF_GOAL_M: Final = 0.002
 PRESSING_RATIO: Final = 0.05
-PRESS_M: Final = 0.004
-"""How far behind a thing's surface a hand that holds it is sent; its Goal PWM bounds the force."""
+PRESS_M: Final = 0.008
+"""So much narrower than what it holds a hand is sent; its Goal PWM bounds the force."""
 
 
 class Payload:
@@ -26,6 +26,11 @@ class Payload:
             name: [robot.joint_index[joint] for joint in robot.group(hand.gripper).joints]
             for name, hand in robot.hands.items()
         }
+        ratio = np.ones(len(robot.joint_names))
+        for name, hand in robot.hands.items():
+            ratio[self._grippers[name]] = hand.opening_ratio
+        self._short, self._press = SHORT_OF_GOAL_M / ratio, PRESS_M / ratio
+        """In the grippers' own coordinates: metres of a finger, or radians of a jaw."""
         self._low = robot.position_min
         self._status = executor_status
 
@@ -33,7 +38,7 @@ class Payload:
         self, position: Floats, setpoint: Floats, effort_ratio: Floats, torque_on: Flags
     ) -> frozenset[str]:
         """Return the hands that hold something, in doubt too many of them."""
-        short = position - setpoint > SHORT_OF_GOAL_M
+        short = position - setpoint > self._short
         pressing = short & (abs(effort_ratio) > PRESSING_RATIO) & torque_on
         felt = {name for name, joints in self._grippers.items() if pressing[joints].any()}
         return frozenset(felt | self._told())
@@ -47,7 +52,8 @@ class Payload:
         begin, told = position.copy(), self._told()
         for name, joints in self._grippers.items():
             if name in told or (effort_ratio[joints] < -PRESSING_RATIO).any():
-                begin[joints] = np.maximum(position[joints] - PRESS_M, self._low[joints])
+                pressing = position[joints] - self._press[joints]
+                begin[joints] = np.maximum(pressing, self._low[joints])
         return begin
 
     def close(self) -> None:
