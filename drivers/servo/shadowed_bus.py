@@ -1,16 +1,16 @@
 """Drive joints that two servos of one bus turn together: a leader, and a shadow beside it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import DriverError
 from drivers.servo.bus import ServoBusDriver
+from drivers.servo.bus_view import BusView
 from drivers.servo.errors import WrongServo
 from drivers.servo.joint_servo import JointServo
-from drivers.servo.journal import BusJournal
 from drivers.servo.state import BusState
 
 MOST_APART_RAD: Final = 0.1
@@ -19,7 +19,7 @@ MOST_APART_RAD: Final = 0.1
 Floats = NDArray[np.float64]
 
 
-class ShadowedBus:
+class ShadowedBus(BusView):
     """Show each joint once: shadows get their leader's goals, and what they sense is joined to it.
 
     Both are commanded by their own ids, and their directions and offsets are the robot file's, so
@@ -29,9 +29,9 @@ class ShadowedBus:
 
     def __init__(self, bus: ServoBusDriver, leaders: Sequence[int]) -> None:
         """Take over a bus whose last servos are shadows; `leaders` are the places of theirs."""
-        self._bus = bus
+        count = len(bus.servos) - len(leaders)
+        super().__init__(bus, count)
         self._leaders = list(leaders)
-        self._count = count = len(bus.servos) - len(leaders)
         self._joint_of = [*range(count), *leaders]
         """The joint of each servo of the bus."""
         self._state = BusState.of(count)
@@ -43,28 +43,6 @@ class ShadowedBus:
         for place, servo in enumerate(bus.servos):
             joint = self._joint_of[place]
             self._servos_of[servo.id] = [n for n, one in enumerate(self._joint_of) if one == joint]
-
-    @property
-    def servos(self) -> tuple[JointServo, ...]:
-        """Return the leaders in the order of all arrays."""
-        return self._bus.servos[: self._count]
-
-    @property
-    def journal(self) -> BusJournal:
-        """Return what is told of every cycle, of each servo by itself."""
-        return self._bus.journal
-
-    def connect(self, *, thorough: bool = True) -> object:
-        """Check that every servo is the declared one and set it up; torque is left as it is.
-
-        Raises:
-            DriverError: a servo is silent or not as declared, or the adapter is unfit.
-        """
-        return self._bus.connect(thorough=thorough)
-
-    def close(self) -> None:
-        """Release the transport; torque is left as it is."""
-        self._bus.close()
 
     def read_state(self) -> BusState:
         """Refresh and return the state of all joints; of two servos the worse value counts.
@@ -90,15 +68,6 @@ class ShadowedBus:
         goals = position_rad[self._joint_of]
         goals[self._count :] += self._apart
         self._bus.write_goals(goals)
-
-    def write_speeds(self, speed_rad_s: Floats) -> None:
-        """Send a speed to every servo that turns a wheel.
-
-        Raises:
-            ValueError: a speed is not finite, or there is not one per wheel.
-            LinkLost: the adapter is gone.
-        """
-        self._bus.write_speeds(speed_rad_s)
 
     def limit_effort(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit the servos of joints, by the id of one; return those that did not take it.
@@ -136,14 +105,6 @@ class ShadowedBus:
         """
         return self._bus.disable_torque(self._ids(ids))
 
-    def clear_watchdog(self) -> None:
-        """Let servos that have stopped by themselves take goals again.
-
-        Raises:
-            DriverError: a servo is silent or refuses.
-        """
-        self._bus.clear_watchdog()
-
     def reboot(self, servo_id: int) -> None:
         """Restart those servos of a joint that report an error, or both where none does.
 
@@ -154,10 +115,6 @@ class ShadowedBus:
         errors = self._seen.error
         for place in [n for n in places if errors[n]] or places:
             self._bus.reboot(self._bus.servos[place].id)
-
-    def telemetry(self) -> dict[str, Any]:
-        """Return counters, cycle times and error budgets by name."""
-        return self._bus.telemetry()
 
     def _ids(self, ids: Sequence[int] | None) -> list[int]:
         """Return the ids of all servos of the joints that these ids belong to."""

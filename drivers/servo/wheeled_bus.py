@@ -1,49 +1,20 @@
 """Show the joints of a bus whose last servos turn wheels, and the wheels beside them."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from drivers.errors import DriverError
 from drivers.servo.bus import ServoBusDriver
-from drivers.servo.joint_servo import JointServo
-from drivers.servo.journal import BusJournal
+from drivers.servo.bus_view import BusView
 from drivers.servo.state import BusState
 
 
-class WheeledBus:
+class WheeledBus(BusView):
     """Leave the wheels out of all that is told of joints; `wheels` is the state of theirs."""
 
     def __init__(self, bus: ServoBusDriver, wheel_count: int) -> None:
         """Take over a bus whose last servos turn wheels."""
-        self._bus = bus
-        self._count = len(bus.servos) - wheel_count
+        super().__init__(bus, len(bus.servos) - wheel_count)
         self._seen = BusState.of(len(bus.servos))
         self._show()
-
-    @property
-    def servos(self) -> tuple[JointServo, ...]:
-        """Return the servos of joints in the order of all arrays."""
-        return self._bus.servos[: self._count]
-
-    @property
-    def journal(self) -> BusJournal:
-        """Return what is told of every cycle, of wheels too."""
-        return self._bus.journal
-
-    def connect(self, *, thorough: bool = True) -> object:
-        """Stop the wheels, check that every servo is the declared one and set it up.
-
-        Raises:
-            DriverError: a servo is silent or not as declared, or the adapter is unfit.
-        """
-        return self._bus.connect(thorough=thorough)
-
-    def close(self) -> None:
-        """Release the transport; torque is left as it is."""
-        self._bus.close()
 
     def read_state(self) -> BusState:
         """Refresh the state of all servos and return that of joints.
@@ -58,32 +29,6 @@ class WheeledBus:
         self._joints.stamp_ns = self.wheels.stamp_ns = seen.stamp_ns
         return self._joints
 
-    def write_goals(self, position_rad: NDArray[np.float64]) -> None:
-        """Send a goal to every joint.
-
-        Raises:
-            ValueError: a goal is not finite, or there is not one per joint.
-            LinkLost: the adapter is gone.
-        """
-        self._bus.write_goals(position_rad)
-
-    def write_speeds(self, speed_rad_s: NDArray[np.float64]) -> None:
-        """Send a speed to every wheel.
-
-        Raises:
-            ValueError: a speed is not finite, or there is not one per wheel.
-            LinkLost: the adapter is gone.
-        """
-        self._bus.write_speeds(speed_rad_s)
-
-    def limit_effort(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
-        """Limit servos (by id) to a ratio of full duty; return those that did not take it.
-
-        Raises:
-            LinkLost: the adapter is gone.
-        """
-        return self._bus.limit_effort(ratios)
-
     def enable_torque(self, ids: Sequence[int] | None = None) -> None:
         """Hold servos, by default all but the wheels', where they are; wheels begin at rest.
 
@@ -91,34 +36,6 @@ class WheeledBus:
             DriverError: a servo is silent, reports an error or refuses.
         """
         self._bus.enable_torque([servo.id for servo in self.servos] if ids is None else ids)
-
-    def disable_torque(self, ids: Sequence[int] | None = None) -> dict[int, DriverError]:
-        """Switch servos (all by default) off; failures are returned by id.
-
-        Raises:
-            LinkLost: the adapter is gone.
-        """
-        return self._bus.disable_torque(ids)
-
-    def clear_watchdog(self) -> None:
-        """Let servos that have stopped by themselves take goals again.
-
-        Raises:
-            DriverError: a servo is silent or refuses.
-        """
-        self._bus.clear_watchdog()
-
-    def reboot(self, servo_id: int) -> None:
-        """Restart a servo and return at once.
-
-        Raises:
-            DriverError: it does not answer.
-        """
-        self._bus.reboot(servo_id)
-
-    def telemetry(self) -> dict[str, Any]:
-        """Return counters, cycle times and error budgets by name."""
-        return self._bus.telemetry()
 
     def _show(self) -> None:
         self._joints = self._seen.part(slice(self._count))

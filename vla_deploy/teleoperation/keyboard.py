@@ -7,9 +7,10 @@ import termios
 import tty
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.teleoperation.driving import DriveWish
 from vla_deploy.teleoperation.errors import HandMotionEnded, InputUnusable
 from vla_deploy.teleoperation.jogging import JogWish
 
@@ -26,7 +27,18 @@ HAND_KEYS: Final[Mapping[bytes, tuple[float, float, float]]] = {
     b"\x1b[6~": (0.0, 0.0, -1.0),
 }
 """Arrows: forward, back, left, right; page up and page down (ECMA-48 sequences, as xterm's)."""
+DRIVE_KEYS: Final[Mapping[bytes, DriveWish]] = {
+    b"\x1b[A": DriveWish(ahead=1.0),
+    b"\x1b[B": DriveWish(ahead=-1.0),
+    b"\x1b[D": DriveWish(turn=1.0),
+    b"\x1b[C": DriveWish(turn=-1.0),
+}
+SIDEWAYS_KEYS: Final[Mapping[bytes, DriveWish]] = {
+    b"a": DriveWish(left=1.0),
+    b"d": DriveWish(left=-1.0),
+}
 _READ_BYTES: Final = 256
+WishT = TypeVar("WishT")
 
 
 def key_table(joints: Sequence[str]) -> dict[bytes, JogWish]:
@@ -44,17 +56,20 @@ def keys_of(joints: Sequence[str]) -> dict[str, str]:
     return {joint: f"{up} +  {down} -" for joint, up, down in pairs}
 
 
-class Keyboard:
+class Keyboard(Generic[WishT]):
     """Ask for what the last key asks for, until it was not pressed for `DEAD_MAN_S`."""
 
-    def __init__(self, descriptor: int, clock: Clock, joints: Sequence[str]) -> None:
+    def __init__(
+        self, descriptor: int, clock: Clock, table: Mapping[bytes, WishT], nothing: WishT
+    ) -> None:
+        """Read the keys of `table`; any other asks for `nothing`."""
         self._descriptor = descriptor
         self._clock = clock
-        self._table = key_table(joints)
-        self._wish = JogWish()
+        self._table = table
+        self._nothing = self._wish = nothing
         self._pressed_ns = clock.now_ns()
 
-    def wish(self) -> JogWish:
+    def wish(self) -> WishT:
         """Return what is asked for now; any key without a meaning stops.
 
         Raises:
@@ -62,10 +77,10 @@ class Keyboard:
         """
         pressed = self._pressed()
         if pressed is not None:
-            self._wish = self._table.get(pressed, JogWish())
+            self._wish = self._table.get(pressed, self._nothing)
             self._pressed_ns = self._clock.now_ns()
         elif self._clock.now_ns() - self._pressed_ns > DEAD_MAN_S * NS_PER_S:
-            self._wish = JogWish()
+            self._wish = self._nothing
         return self._wish
 
     def _pressed(self) -> bytes | None:
@@ -84,7 +99,9 @@ class Keyboard:
 
 
 @contextmanager
-def keys_of_terminal(clock: Clock, joints: Sequence[str]) -> Iterator[Keyboard]:
+def keys_of_terminal(
+    clock: Clock, table: Mapping[bytes, WishT], nothing: WishT
+) -> Iterator[Keyboard[WishT]]:
     """Read keys unbuffered and unechoed for a `with` block; Ctrl-C stays Ctrl-C.
 
     Raises:
@@ -96,6 +113,6 @@ def keys_of_terminal(clock: Clock, joints: Sequence[str]) -> Iterator[Keyboard]:
     before = termios.tcgetattr(descriptor)
     tty.setcbreak(descriptor)
     try:
-        yield Keyboard(descriptor, clock, joints)
+        yield Keyboard(descriptor, clock, table, nothing)
     finally:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

@@ -1,4 +1,4 @@
-"""Jog by a gamepad, as long as its left shoulder button is held."""
+"""Jog the arm or drive the base by a gamepad, as long as its left shoulder button is held."""
 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -9,6 +9,7 @@ from drivers.clock import Clock
 from drivers.errors import DriverError
 from drivers.estop.input_device import InputDevice
 from drivers.gamepad import Gamepad, PadAxis, PadButton
+from vla_deploy.teleoperation.driving import DriveWish
 from vla_deploy.teleoperation.errors import HandMotionEnded, InputUnusable
 from vla_deploy.teleoperation.jogging import JogWish
 
@@ -40,11 +41,7 @@ class PadJog:
             HandMotionEnded: the gamepad is lost.
         """
         pad = self._pad
-        try:
-            pad.poll()
-        except DriverError as error:
-            raise HandMotionEnded(f"the gamepad is lost: {error}") from error
-        if not pad.is_held(PadButton.LEFT_SHOULDER):
+        if not _is_permitted(pad):
             return JogWish()
         grip = pad.axis(PadAxis.LEFT_TRIGGER) - pad.axis(PadAxis.RIGHT_TRIGGER)
         joints = {one: grip for one in self._grippers if grip}
@@ -58,16 +55,46 @@ class PadJog:
         return JogWish(joints=joints)
 
 
+class PadDrive:
+    """Ask for what the sticks say: the left one ahead, back and sideways, the right one turns."""
+
+    def __init__(self, pad: Gamepad) -> None:
+        self._pad = pad
+
+    def wish(self) -> DriveWish:
+        """Return what is asked for now; nothing while the left shoulder button is up.
+
+        Raises:
+            HandMotionEnded: the gamepad is lost.
+        """
+        if not _is_permitted(self._pad):
+            return DriveWish()
+        wanted = [PadAxis.LEFT_Y, PadAxis.RIGHT_X, PadAxis.LEFT_X]
+        ahead, turn, left = (-self._pad.axis(one) for one in wanted)
+        return DriveWish(ahead=ahead, turn=turn, left=left)
+
+
+def _is_permitted(pad: Gamepad) -> bool:
+    """Return whether the dead-man button is held.
+
+    Raises:
+        HandMotionEnded: the gamepad is lost.
+    """
+    try:
+        pad.poll()
+    except DriverError as error:
+        raise HandMotionEnded(f"the gamepad is lost: {error}") from error
+    return pad.is_held(PadButton.LEFT_SHOULDER)
+
+
 @contextmanager
-def gamepad_at(
-    path: Path | None, clock: Clock, joints: Sequence[str], grippers: Collection[str]
-) -> Iterator[PadJog]:
-    """Open a gamepad for a `with` block: the one that is plugged in, where none is named.
+def gamepad_at(path: Path, clock: Clock) -> Iterator[Gamepad]:
+    """Open a gamepad for a `with` block: the one that is plugged in, where the path is empty.
 
     Raises:
         InputUnusable: there is none, there are several, or it may not be read.
     """
-    path = path or _only_one()
+    path = _only_one() if path == Path() else path
     try:
         device = InputDevice(path, clock)
     except DriverError as error:
@@ -78,7 +105,7 @@ def gamepad_at(
         ) from error
     pad = Gamepad(device, device.axis_range)
     try:
-        yield PadJog(pad, joints, grippers)
+        yield pad
     finally:
         pad.close()
 

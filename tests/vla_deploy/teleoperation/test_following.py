@@ -13,7 +13,8 @@ from tests.vla_deploy.teleoperation.conftest import FOLDED, MOTORS, SO101, Handl
 from vla_deploy.cli.main import main
 from vla_deploy.cli.operation import teleoperate
 from vla_deploy.cli.session import RobotSession
-from vla_deploy.teleoperation.keyboard import Keyboard
+from vla_deploy.teleoperation.jogging import JogWish
+from vla_deploy.teleoperation.keyboard import Keyboard, key_table
 from vla_deploy.teleoperation.leader_arm import LeaderArm, open_leader
 
 AMPLITUDES = np.array([0.6, 0.5, -0.5, 0.3, 0.8, 0.5])
@@ -40,7 +41,7 @@ def command(
     def jog_input(*_: Any) -> Iterator[Keyboard]:
         ends = os.pipe()
         os.write(ends[1], b"q")  # counts for 0.3 s
-        yield Keyboard(ends[0], arm, SO101.joint_names)
+        yield Keyboard(ends[0], arm, key_table(SO101.joint_names), JogWish())
         for one in ends:
             os.close(one)
 

@@ -12,10 +12,11 @@ from drivers.estop.input_event import EventType, InputEvent, encode_event
 from drivers.gamepad import ABSOLUTE, Gamepad, PadAxis, PadButton
 from tests.vla_deploy.teleoperation.conftest import SO101, HandClock
 from vla_deploy.robots.kinematics.model import RobotModel
+from vla_deploy.teleoperation.driving import DriveWish
 from vla_deploy.teleoperation.errors import HandMotionEnded
 from vla_deploy.teleoperation.jogging import HAND_SPEED_M_S, LEAD_RAD, JogHand, JogWish
-from vla_deploy.teleoperation.keyboard import Keyboard
-from vla_deploy.teleoperation.pad_jog import PadJog
+from vla_deploy.teleoperation.keyboard import Keyboard, key_table
+from vla_deploy.teleoperation.pad_jog import PadDrive, PadJog
 
 READY = np.array(list(SO101.poses["ready"].values()))
 NOTHING = JogWish()
@@ -91,7 +92,7 @@ def pipe() -> Iterator[tuple[int, int]]:
 
 def test_a_key_counts_for_a_moment(pipe: tuple[int, int]) -> None:
     clock = HandClock()
-    keyboard = Keyboard(pipe[0], clock, SO101.joint_names)
+    keyboard = Keyboard(pipe[0], clock, key_table(SO101.joint_names), NOTHING)
     assert keyboard.wish() == NOTHING
     for keys, wish in (
         (b"1", JogWish(joints={"shoulder_pan": 1.0})),
@@ -146,8 +147,11 @@ def test_sticks_count_while_the_left_shoulder_is_held() -> None:
     assert jog.wish() == JogWish(joints={"gripper": -1.0, "shoulder_lift": 1.0})
     line.put(EventType.KEY, PadButton.RIGHT_SHOULDER, 1)
     assert jog.wish().hand == (1.0, 0.0, 0.0)
+    line.put(ABSOLUTE, PadAxis.RIGHT_X, 100)
+    assert PadDrive(pad).wish() == DriveWish(ahead=1.0, turn=-1.0)
     line.put(EventType.KEY, PadButton.LEFT_SHOULDER, 0)
     assert jog.wish() == NOTHING
+    assert PadDrive(pad).wish() == DriveWish()
     line.is_gone = True
     with pytest.raises(HandMotionEnded, match="the gamepad is lost: unplugged"):
         jog.wish()

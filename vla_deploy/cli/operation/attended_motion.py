@@ -1,4 +1,4 @@
-"""Move joints from a command that a person watches: claimed, until stopped by anybody."""
+"""Move parts from a command that a person watches: claimed, until stopped by anybody."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -36,21 +36,21 @@ class AttendedMotion:
             "cancel" in one.payload and "of" not in one.payload for one in self._orders.drain()
         ]
         if any(stops):
-            raise CommandFailed("stopped on request; the joints come to rest where they are")
+            raise CommandFailed("stopped on request; the robot comes to rest where it is")
         if self._session.document(topics.CONTROL_STATUS, _FRESH_S) is None:
             raise CommandFailed(SILENT)
 
 
 @contextmanager
 def attended_motion(
-    session: RobotSession, robot: RobotDescription, holder: str, joints: Sequence[str]
+    session: RobotSession, robot: RobotDescription, holder: str, parts: Sequence[str]
 ) -> Iterator[AttendedMotion]:
-    """Claim the groups of joints for a `with` block, and end the block's motions with it.
+    """Claim groups of joints, or the base, for a `with` block, and end its motions with it.
 
     Raises:
-        CommandFailed: the robot is not armed, or something else moves these joints.
+        CommandFailed: the robot is not armed, or something else moves these parts.
     """
-    claim = Claimed(session, holder, robot.groups_moving(joints))
+    claim = Claimed(session, holder, parts)
     refusal = refusal_of(session.document(topics.CONTROL_STATUS, _FRESH_S)) or claim.why_not_taken()
     if refusal:
         raise CommandFailed(refusal)

@@ -213,7 +213,8 @@ def _judge(robot: RobotDescription, window: PathWindow) -> None:
 
 
 def _play(session: RobotSession, robot: RobotDescription, path: TimedPath) -> PlayedPath:
-    with attended_motion(session, robot, "cli/joint_play", path.joints) as attended:
+    parts = robot.groups_moving(path.joints)
+    with attended_motion(session, robot, "cli/joint_play", parts) as attended:
         motions = attended.motions
 
         def wait() -> None:

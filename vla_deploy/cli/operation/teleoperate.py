@@ -1,35 +1,42 @@
-"""`vla-deploy teleoperate`: move the arm by hand, through the limits and safety of any motion."""
+"""`vla-deploy teleoperate`: move arm or base by hand, by the limits and safety of any motion."""
 
 import argparse
 import sys
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from drivers.servo.family import FAMILIES, family_of, servo_family
-from vla_deploy.cli.commands import add_top_command, emit, whole_number
+from vla_deploy.cli.commands import add_top_command, emit, number_within, whole_number
 from vla_deploy.cli.devices.console import Console
 from vla_deploy.cli.devices.servo_bus import ServoBusPort
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.operation.attended_motion import AttendedMotion, attended_motion
+from vla_deploy.cli.operation.drive_by_hand import drive
 from vla_deploy.cli.session import RobotSession, attach
 from vla_deploy.cli.terminal import CLEAR_SCREEN, control
 from vla_deploy.client.motions import JointView, joint_view
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.calibration.lerobot_file import read_lerobot, write_lerobot
 from vla_deploy.robots.loader import robot_names
+from vla_deploy.teleoperation.driving import SPEED_RATIO
 from vla_deploy.teleoperation.errors import HandMotionEnded
 from vla_deploy.teleoperation.following import PERIOD_S, HandFollowing
 from vla_deploy.teleoperation.hand_pose import Floats, HandInput
-from vla_deploy.teleoperation.jogging import JogHand, JogInput
-from vla_deploy.teleoperation.keyboard import DEAD_MAN_S, keys_of, keys_of_terminal
+from vla_deploy.teleoperation.jogging import JogHand, JogInput, JogWish
+from vla_deploy.teleoperation.keyboard import (
+    DEAD_MAN_S,
+    key_table,
+    keys_of,
+    keys_of_terminal,
+)
 from vla_deploy.teleoperation.leader_arm import LeaderArm, open_leader
 from vla_deploy.teleoperation.leader_calibration import calibrated_leader
 from vla_deploy.teleoperation.leader_robot import open_leader_robot
-from vla_deploy.teleoperation.pad_jog import gamepad_at
+from vla_deploy.teleoperation.pad_jog import PadJog, gamepad_at
 
 SCREEN_S: Final = 0.1
 EXAMPLES: Final = """\
@@ -38,6 +45,7 @@ EXAMPLES: Final = """\
   vla-deploy teleoperate --leader /dev/ttyACM1 --calibration lead.json --approach
   vla-deploy teleoperate --keyboard
   vla-deploy teleoperate --gamepad
+  vla-deploy teleoperate --keyboard --base
 """
 
 
@@ -66,6 +74,15 @@ def register(commands: Any) -> None:
         const=Path(),
         metavar="DEVICE",
         help="jog by a gamepad (default: the one that is plugged in) with its left shoulder held",
+    )
+    command.add_argument(
+        "--base", action="store_true", help="drive the base by keys or sticks, not the arm"
+    )
+    command.add_argument(
+        "--speed",
+        type=number_within(0.05, 1.0, "a number from 0.05 to 1"),
+        metavar="RATIO",
+        help=f"of the base's top speed, with --base (default: {SPEED_RATIO:g})",
     )
     command.add_argument(
         "--calibration",
@@ -104,6 +121,10 @@ def run(arguments: argparse.Namespace) -> int:
         LeaderUnusable: the leader has torque, or its calibration is not the robot's.
         CommandFailed: the robot is not armed, was stopped, or the leader was lost.
     """
+    if arguments.base and arguments.leader is not None:
+        raise UsageError("--base: expected --keyboard or --gamepad, a leader has no wheels")
+    if arguments.speed is not None and not arguments.base:
+        raise UsageError("--speed: expected --base, whose speed it bounds")
     leads = None if arguments.leader is None else leader_robot(arguments)
     if arguments.leader is not None and leads is None and arguments.calibration is None:
         raise UsageError(
@@ -118,6 +139,8 @@ def run(arguments: argparse.Namespace) -> int:
     robot = session.running_robot()
     if arguments.robot is not None and load_robot(arguments.robot).name != robot.name:
         raise UsageError(f"--robot {arguments.robot}: {robot.name} runs")
+    if arguments.base:
+        return drive(arguments, session, robot)
     if arguments.leader is not None:
         opened = leader_of if leads is None else partial(leader_of_file, leads)
         with opened(arguments, session, robot) as leader:
@@ -132,14 +155,18 @@ def _setpoints(session: RobotSession, robot: RobotDescription) -> Floats | None:
     return None if view is None else view.setpoint
 
 
+@contextmanager
 def jog_input(
     arguments: argparse.Namespace, session: RobotSession, robot: RobotDescription
-) -> AbstractContextManager[JogInput]:
-    """Return what opens the keyboard or the gamepad for a `with` block."""
+) -> Iterator[JogInput]:
+    """Open the keyboard or the gamepad for a `with` block."""
     if arguments.keyboard:
-        return keys_of_terminal(session.clock, robot.joint_names)
-    path = None if arguments.gamepad == Path() else arguments.gamepad
-    return gamepad_at(path, session.clock, robot.joint_names, robot.gripper_joints)
+        table = key_table(robot.joint_names)
+        with keys_of_terminal(session.clock, table, JogWish()) as keyboard:
+            yield keyboard
+    else:
+        with gamepad_at(arguments.gamepad, session.clock) as pad:
+            yield PadJog(pad, robot.joint_names, robot.gripper_joints)
 
 
 def leader_robot(arguments: argparse.Namespace) -> RobotDescription | None:
@@ -227,7 +254,8 @@ def _follow(
     hand: HandInput,
 ) -> int:
     began_ns = session.clock.now_ns()
-    with attended_motion(session, robot, "cli/teleoperate", hand.joints) as attended:
+    parts = robot.groups_moving(hand.joints)
+    with attended_motion(session, robot, "cli/teleoperate", parts) as attended:
         following = HandFollowing(attended.motions, robot, hand, approach=arguments.approach)
         screen = JogScreen(session, robot, arguments) if arguments.leader is None else None
         why = _until_ended(session, attended, following, screen)
