@@ -4,6 +4,7 @@ The pack is a charge behind a resistance: its voltage is the open-circuit curve'
 current takes. Its gauge is a folder of files as the kernel has them (sysfs-class-power).
 """
 
+import errno
 import itertools
 import math
 import shutil
@@ -172,10 +173,18 @@ class PowerSupplyFiles:
         self._put("energy_now", str(round(pack.capacity_wh * pack.charge_ratio * _MICRO)))
 
     def _put(self, name: str, text: str) -> None:
-        """Replace a file at once: a reader sees the old text or the new one."""
+        """Replace a file at once: a reader sees the old text or the new one.
+
+        Without room on the disk the old one stays: a kernel's gauge needs none, and no twin ends.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
         written = self.folder / f".{name}"
-        written.write_text(f"{text}\n", encoding="ascii")
+        try:
+            written.write_text(f"{text}\n", encoding="ascii")
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            return
         written.replace(self.folder / name)
 
 

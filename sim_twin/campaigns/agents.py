@@ -22,7 +22,7 @@ import anyio
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.processes import played
-from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from sim_twin.physics.truth import STANDSTILL_RAD_S, fastest_joint
@@ -96,6 +96,7 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     return CampaignReport(campaign="agents", cases=cases, summary=summary)
 
 
+@crash_is_failure
 def play(name: str, calls: int) -> CampaignCase:
     """Play the case of that name with so many calls."""
     kind, _, seed = name.partition("/")

@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure, told
 from sim_twin.harness.robot import VLA_DEPLOY
 
 COUNT: Final = 10
@@ -54,6 +54,7 @@ def faults_of(outcome: Outcome) -> list[str]:
     return faults + [f"{what}: {outcome[what]}, expected 0" for what in counted]
 
 
+@crash_is_failure
 def play(seed: int, robot: str) -> CampaignCase:
     """Do the job of a robot with a seed and judge it."""
     outcome = play_demo(seed, robot, "--typed", "--fast", "--headless")

@@ -18,7 +18,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.evidence import Watch, unwatched
 from sim_twin.campaigns.processes import played
-from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 
@@ -97,6 +97,7 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     return CampaignReport(campaign="missions", cases=cases, summary=summary)
 
 
+@crash_is_failure
 def play(name: str, seed: int, watch: Watch = unwatched) -> CampaignCase:
     """Play the case of that name; `seed` is that of the paused jobs."""
     kind, _, which = name.partition("/")

@@ -5,6 +5,8 @@ around/SEED      the same with a chair in each way that is not on the map and le
 passing/SEED     the same while somebody walks through the way
 following/SEED   "follow me" for a minute of walking through the rooms
 sweeping/ROOM    "vacuum the ..." of each place that has a floor
+guard/SEED       "guard the ..." of a room: nobody, then somebody comes in, goes, and comes again
+inspect/SEED     "inspect the ..." of a thing: from two sides, as physics has thing and robot
 """
 
 import argparse
@@ -26,7 +28,7 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.evidence import Watch, unwatched
 from sim_twin.campaigns.processes import played
-from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure
 from sim_twin.campaigns.selection import chosen
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 from vla_deploy.navigation.errors import NoPath
@@ -48,6 +50,16 @@ STROLL_M_S: Final = 0.35
 """The base does 0.45 m/s at most."""
 CHAIR_HALF_M: Final = 0.2
 LEAVES_M: Final = 0.1
+TOLD_WITHIN_S: Final = 3.0
+"""Somebody is reported before they have been in view for longer."""
+IN_VIEW_M: Final = 3.5
+"""As far as perception trusts what the lidar shows beside the map."""
+QUIET_S: Final = 10.0
+GONE_S: Final = 8.0
+COMES_M: Final = 5.0
+"""So long is the way on which somebody comes in."""
+APART_RAD: Final = math.radians(60.0)
+SEEN_WITHIN_M: Final = 0.05
 _LOOK_S: Final = 0.1
 _LIMIT_S: Final = 120.0
 _SWEEP_LIMIT_S: Final = 900.0
@@ -72,7 +84,7 @@ class _Notes:
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignReport:
     """Play every case, several at a time; `options.count` seeds, 3 unless given."""
     seeds = range(options.seed, options.seed + (COUNT if options.count is None else options.count))
-    kinds = ("drives", "around", "passing", "following")
+    kinds = ("drives", "around", "passing", "following", "guard", "inspect")
     names = [f"{kind}/{seed}" for kind in kinds for seed in seeds]
     places = load_robot("butler").places
     names += [f"sweeping/{name}" for name, place in places.items() if place.floor_m]
@@ -80,6 +92,7 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> CampaignRep
     return CampaignReport(campaign="navigation", cases=cases, summary=_summary(cases))
 
 
+@crash_is_failure
 def play(name: str, watch: Watch = unwatched) -> CampaignCase:
     """Play the case of that name."""
     kind, _, which = name.partition("/")
@@ -92,6 +105,10 @@ def play(name: str, watch: Watch = unwatched) -> CampaignCase:
                 _follow(course, notes)
             case "sweeping":
                 _sweep(course, which, notes)
+            case "guard":
+                _guard(course, notes)
+            case "inspect":
+                _inspect(course, notes)
             case _:
                 _drive(course, kind, notes)
     return CampaignCase(
@@ -105,7 +122,14 @@ def play(name: str, watch: Watch = unwatched) -> CampaignCase:
 def _summary(cases: tuple[CampaignCase, ...]) -> dict[str, Any]:
     shares = {
         name: [one.figures[name] for one in cases if one.figures.get(name) is not None]
-        for name in ("path_efficiency", "covered", "share_beside", "nearest_m", "held")
+        for name in (
+            "path_efficiency",
+            "covered",
+            "share_beside",
+            "nearest_m",
+            "held",
+            "told_after_s",
+        )
     }
     told = {f"mean {name}": round(mean(all_of), 3) for name, all_of in shares.items() if all_of}
     done = sum(not case.failures for case in cases)
@@ -143,6 +167,18 @@ class _Course:
         return min(
             float(mujoco.mj_geomDistance(model, data, *pair, _FAR_M, line)) for pair in pairs
         )
+
+    def is_in_view(self) -> bool:
+        """Return whether nothing is between the lidar and somebody who is near enough to it."""
+        model, data, at_m = self._engine.model, self._engine.data, self.person.document()["at_m"]
+        lidar = data.site(self.stack.robot.lidar.site).xpos
+        if at_m is None or math.dist(at_m, lidar[:2]) > IN_VIEW_M:
+            return False
+        begin, hit = np.array((*at_m, lidar[2])), np.array((-1,), dtype=np.int32)
+        them = model.body("person").id
+        mujoco.mj_ray(model, data, begin, lidar - begin, None, 1, them, hit, None)
+        body = model.geom_bodyid[hit[0]] if hit[0] >= 0 else 0
+        return bool(model.body_rootid[body] == model.body_rootid[model.body("base").id])
 
     def touches(self) -> bool:
         """Return whether a part of the robot touches what stands fast."""
@@ -314,6 +350,129 @@ def _sweep(course: _Course, room: str, notes: _Notes) -> None:
         notes.failures.append(f"{(outcome or {}).get('error') or 'no end in time'}")
     elif covered < COVERED:
         notes.failures.append(f"covered {covered:.1%} of the floor, expected {COVERED:.0%}")
+
+
+def _guard(course: _Course, notes: _Notes) -> None:
+    """Let nobody come, then somebody twice; each time they are reported once, and soon."""
+    stack = course.stack
+    room = course.random.choice(ROOMS)
+    command_id = stack.give(text=f"guard the {spoken(room)}")
+    post = stack.robot.places[room].pose
+    if not stack.lockstep.run_until(
+        lambda: math.dist(course.at, (post.x_m, post.y_m)) < SEEN_WITHIN_M, _LIMIT_S
+    ):
+        notes.failures.append(f"it did not get to the {spoken(room)}")
+        return
+    stack.lockstep.run_for(QUIET_S)
+    after_s: list[float] = []
+    if _reports(course, command_id):
+        notes.failures.append("it reported somebody while nobody was there")
+    for visit in (1, 2):
+        begun = _reports(course, command_id)
+        way = _way_in(course)
+        course.person.walk(way, WALK_M_S)
+        told_s = _until_told(course, command_id, begun)
+        after_s += [] if told_s is None else [told_s]
+        if told_s is None or told_s > TOLD_WITHIN_S:
+            words = "not reported" if told_s is None else f"reported after {told_s:.1f} s in view"
+            notes.failures.append(f"visit {visit}: {words}, expected within {TOLD_WITHIN_S:g} s")
+        stack.lockstep.run_until(lambda: not course.person.document()["walks"], _LIMIT_S)
+        stack.lockstep.run_for(2.0)
+        course.person.walk(way[::-1], WALK_M_S)
+        stack.lockstep.run_until(lambda: not course.person.document()["walks"], _LIMIT_S)
+        course.person.walk([], 1.0)
+        stack.lockstep.run_for(GONE_S)
+        if (more := _reports(course, command_id) - begun) != 1:
+            notes.failures.append(f"visit {visit}: {more} reports, expected 1")
+    notes.figures |= {"told_after_s": round(max(after_s), 2) if after_s else None}
+    stack.give(text="stop")
+    if not stack.lockstep.run_until(lambda: stack.outcome(command_id) is not None, 5.0):
+        notes.failures.append("it did not end when told to")
+
+
+def _reports(course: _Course, command_id: str) -> int:
+    course.stack.outcome(command_id)  # takes in the events
+    said = (one["text"] for one in course.stack.events if one["event"] == "said")
+    return sum("come in" in text for text in said)
+
+
+def _way_in(course: _Course) -> list[list[float]]:
+    """Return a way that begins out of view and ends near the robot, in view, not through it."""
+    x_m, y_m = course.at
+    places = [one.pose for one in course.stack.robot.places.values()]
+    course.random.shuffle(places)
+    planner = course.planner.around(np.array((course.at,)), 0.45)
+    for start in places:
+        for angle_rad in np.linspace(0.0, math.tau, 24, endpoint=False).tolist():
+            end = (x_m + 1.3 * math.cos(angle_rad), y_m + 1.3 * math.sin(angle_rad))
+            if not (planner.is_free(*end) and _is_seen_at(course, [*end])):
+                continue
+            try:
+                way = _end_of(planner.plan((start.x_m, start.y_m), end))
+            except NoPath:
+                continue
+            if not _is_seen_at(course, way[0]):
+                return way
+    raise NoPath(f"nobody gets to {course.at} from out of view")
+
+
+def _is_seen_at(course: _Course, at: list[float]) -> bool:
+    """Return whether somebody who stood there would be in view; they are there for no time."""
+    course.person.walk([at], WALK_M_S)
+    is_seen = course.is_in_view()
+    course.person.walk([], 1.0)
+    return is_seen
+
+
+def _end_of(way: _Points) -> list[list[float]]:
+    """Return the last COMES_M of a way."""
+    samples = np.vstack([np.linspace(a, b, 50) for a, b in pairwise(way)])
+    left_m = _length_m(samples) - np.cumsum(np.r_[0.0, np.hypot(*np.diff(samples, axis=0).T)])
+    near: list[list[float]] = samples[left_m <= COMES_M].tolist()
+    return near
+
+
+def _until_told(course: _Course, command_id: str, before: int) -> float | None:
+    """Return for how long somebody was in view when they were reported; None if they were not."""
+    in_view_s, end_s = 0.0, course.stack.lockstep.now_s + _LIMIT_S
+    while course.stack.lockstep.now_s < end_s and in_view_s < 2.0 * TOLD_WITHIN_S:
+        if _reports(course, command_id) > before:
+            return in_view_s
+        course.stack.lockstep.run_for(_LOOK_S)
+        in_view_s += _LOOK_S if course.is_in_view() else 0.0
+    return None
+
+
+def _inspect(course: _Course, notes: _Notes) -> None:
+    stack = course.stack
+    things = stack.lockstep.truth()["objects"]
+    name = course.random.choice(sorted(things))
+    command_id = stack.give(text=f"inspect the {spoken(name)}")
+    poses: list[tuple[float, float]] = []
+    end_s = stack.lockstep.now_s + 3.0 * _LIMIT_S
+    while (outcome := stack.outcome(command_id)) is None and stack.lockstep.now_s < end_s:
+        stack.lockstep.run_for(_LOOK_S)
+        poses.append(course.at)
+        if course.touches():
+            notes.touched()
+            break
+    action = ((outcome or {}).get("actions") or [{}])[-1]
+    sides = action.get("data", {}).get("sides", ())
+    if not (outcome or {}).get("success") or not sides:
+        notes.failures.append(f"{name}: {(outcome or {}).get('error') or 'no end in time'}")
+        return
+    at_m = things[name]["position_m"][:2]
+    bearings = []
+    for side in sides:
+        stood = min(poses, key=lambda one: math.dist(one, (side["from_x_m"], side["from_y_m"])))
+        bearings.append(math.atan2(stood[1] - at_m[1], stood[0] - at_m[0]))
+        off_m = math.dist(side["position_m"][:2], at_m)
+        if side["class"] not in name or off_m > SEEN_WITHIN_M:
+            notes.failures.append(f"{name}: saw a {side['class']}, {off_m:.2f} m from it")
+    apart_rad = abs(math.remainder(bearings[-1] - bearings[0], math.tau))
+    notes.figures |= {"thing": name, "apart_deg": round(math.degrees(apart_rad))}
+    if apart_rad < APART_RAD and "no such place" not in (action.get("note") or ""):
+        notes.failures.append(f"{name}: {math.degrees(apart_rad):.0f} degrees apart, not told")
 
 
 def _length_m(way: _Points) -> float:

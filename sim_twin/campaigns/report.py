@@ -1,15 +1,20 @@
 """Report a campaign's cases as a table, as JSON and as JUnit XML."""
 
 import errno
+import functools
 import json
 import os
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 from xml.etree import ElementTree
 
 from sim_twin.campaigns.selection import OptionRefused
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,6 +112,30 @@ def told(case: CaseT, tell: Callable[[str], None]) -> CaseT:
     """Report a case as soon as it is over, and return it."""
     tell(case.row)
     return case
+
+
+def crashed(name: str, error: Exception) -> CampaignCase:
+    """Return a case that failed by what it raised; its traceback goes to the error output."""
+    traceback.print_exception(error)
+    return CampaignCase(name=name, failures=(f"crashed: {type(error).__name__}: {error}",))
+
+
+def crash_is_failure(
+    play: Callable[Concatenate[T, P], CampaignCase],
+) -> Callable[Concatenate[T, P], CampaignCase]:
+    """Let a case whose play raises have failed: the others are played all the same.
+
+    The case is the first argument, by its name or with one.
+    """
+
+    @functools.wraps(play)
+    def judged(case: T, /, *arguments: P.args, **options: P.kwargs) -> CampaignCase:
+        try:
+            return play(case, *arguments, **options)
+        except Exception as error:  # whatever it is, hours of other cases must not be lost by it
+            return crashed(str(getattr(case, "name", case)), error)
+
+    return judged
 
 
 class NoRoom(OptionRefused):

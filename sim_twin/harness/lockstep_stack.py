@@ -277,9 +277,18 @@ class LockstepStack(LockstepControl):
         Raises:
             RobotFailed: it does not end in time.
         """
-        command_id = self.give(text=text)
+        return self.end_of(self.give(text=text), timeout_s, text)
+
+    def end_of(
+        self, command_id: str, timeout_s: float = COMMAND_TIMEOUT_S, text: str = ""
+    ) -> dict[str, Any]:
+        """Run until a command has ended, given as `text`; return its outcome.
+
+        Raises:
+            RobotFailed: it does not end in time.
+        """
         if not self.wait_until(lambda: self.outcome(command_id) is not None, timeout_s):
-            raise RobotFailed(f'"{text}" did not end within {timeout_s:g} s')
+            raise RobotFailed(f'"{text or command_id}" did not end within {timeout_s:g} s')
         return self._outcomes.pop(command_id)
 
 

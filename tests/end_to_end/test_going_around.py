@@ -78,3 +78,20 @@ def test_it_follows_somebody_at_a_distance_and_tells_when_they_are_gone(
     assert outcome is not None
     assert not outcome["success"]
     assert "I lost whom I followed" in str(outcome)
+
+
+def test_on_guard_it_reports_who_comes_in_once_and_nobody_else(stack: LockstepStack) -> None:
+    person = stack.lockstep.twin.person
+    guarding = stack.give(text="keep watch here for ten minutes")
+    stack.lockstep.run_for(4.0)
+    stack.outcome(guarding)
+    assert not stack.has_said("come in")
+    person.walk([(5.0, 2.5), (2.2, 2.6), (3.0, 2.6)], 0.7)
+    stack.lockstep.run_for(6.0)
+    stack.give(text="stop")
+    assert stack.lockstep.run_until(lambda: stack.outcome(guarding) is not None, 5.0)
+    (told,) = (one["text"] for one in stack.events if one["event"] == "said")
+    assert told.startswith("Somebody has come in, ")
+    assert told.endswith(" metres ahead of me, in the living room.")
+    (action,) = (stack.outcome(guarding) or {})["actions"]
+    assert (action["status"], action["data"]["came_in"]) == ("cancelled", 1)

@@ -37,6 +37,7 @@ SPEED = 8
 UNHEARD: Final = [
     "flight_event",
     "flight_request",
+    "hand_base_command",
     "heard",
     "operator",
     "profile_answer",

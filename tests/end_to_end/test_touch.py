@@ -68,9 +68,7 @@ def test_a_cup_that_comes_down_on_the_rim_of_a_box_is_raised_and_put_into_it(
     assert stack.lockstep.run_until(lambda: _is_about_to_come_down(stack, BOX, above, 0.03), 120.0)
     x_m, y_m, z_m = engine.data.body(BOX).xpos
     engine.place(BOX, x_m - BOX_NUDGE_M, y_m, z_m, 0.0)
-    assert stack.lockstep.run_until(lambda: stack.outcome(command) is not None, 120.0)
-    outcome = stack.outcome(command)
-    assert outcome is not None
+    outcome = stack.end_of(command, 120.0)
     assert outcome["success"], outcome["error"]
     tries = [str(one.get("error")) for one in stack.events if one["event"] == "action"]
     assert any("has met something" in error for error in tries), tries

@@ -89,6 +89,21 @@ def test_its_gauge_is_a_folder_of_the_kernels_files(tmp_path: Path) -> None:
     assert int((folder / "current_now").read_text()) < 0
 
 
+def test_on_a_full_disk_its_gauge_shows_what_it_showed_before(tmp_path: Path) -> None:
+    pack = Pack(0.5)
+    pack.battery.serve(tmp_path)
+    pack.run(3)
+    folder = tmp_path / "sys/class/power_supply/BAT0"
+    fresh = folder / ".energy_now"
+    fresh.symlink_to("/dev/full")
+    before = (folder / "energy_now").read_text()
+    pack.run(3)
+    assert (folder / "energy_now").read_text() == before
+    fresh.unlink()
+    pack.run(3)
+    assert int((folder / "energy_now").read_text()) < int(before)
+
+
 @pytest.fixture
 def butler() -> RobotDescription:
     return load_robot("butler")

@@ -7,12 +7,12 @@ import pytest
 
 CHILD = """
 import json, os, resource, sys
+from sim_twin.priority import claim_priority  # while whose home it is in may be read
 if sys.argv[1] == "limited":
     resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
     resource.setrlimit(resource.RLIMIT_NICE, (0, 0))
     os.setgid(65534)
     os.setuid(65534)
-from sim_twin.priority import claim_priority
 got = claim_priority()
 print(json.dumps([got.value, os.sched_getscheduler(0) & 7, os.getpriority(os.PRIO_PROCESS, 0)]))
 pid = os.fork()

@@ -30,7 +30,17 @@ class RobotActivity(StrEnum):
 
 BY_SKILL: Final[Mapping[str, RobotActivity]] = {
     **dict.fromkeys(
-        ("navigate_to", "charge", "follow_person", "sweep", "move", "turn", "find_object"),
+        (
+            "navigate_to",
+            "charge",
+            "follow_person",
+            "guard",
+            "inspect",
+            "sweep",
+            "move",
+            "turn",
+            "find_object",
+        ),
         RobotActivity.NAVIGATING,
     ),
     **dict.fromkeys(

@@ -259,6 +259,8 @@ JUDGES: Final[Mapping[str, Judge]] = {
     "find_object": _look,
     "look_at": _look,
     "navigate_to": _navigate,
+    "inspect": _navigate,
+    "guard": lambda given, outlook: _navigate(given, outlook) if "place" in given else None,
     "charge": _navigate,
     "move": _move,
     "pick_up": _pick_up,

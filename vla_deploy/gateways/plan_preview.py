@@ -14,6 +14,7 @@ from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.plans.knowledge import world_of
 from vla_deploy.robots import RobotDescription
+from vla_deploy.world.own_words import OwnWords
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +56,7 @@ class PlanPreview:
 
 def preview_request(text: str, robot: RobotDescription, link: RobotLink | None) -> PlanRequest:
     """Return the request that a command makes in the robot's situation; without one in none."""
+    text = OwnWords(robot.words).read(text)
     if link is None:
         return PlanRequest(command_id="plan", text=text, world=world_of(robot, {}))
     situation = Situation(link.space, link.clock, robot)

@@ -131,8 +131,9 @@ def _pooled(values: NDArray[Any], mask: NDArray[np.int64], pooling: Pooling) -> 
     if pooling is Pooling.FIRST:
         return np.ascontiguousarray(rows[:, 0])
     weights = mask[:, :, np.newaxis].astype(np.float32)
-    mean: Vectors = (rows * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)
-    return mean
+    mean = (rows * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)
+    pooled: Vectors = mean.astype(np.float32, copy=False)
+    return pooled
 
 
 def _tokenizer(folder: Path, most_tokens: int) -> Tokenizer:

@@ -495,19 +495,29 @@ ROS_ANSWER = Topic(
     slots=64,
     slot_bytes=2048,
 )
+_DATED_VELOCITY: Final = (
+    PackedField("v_m_s", "f8", unit="m/s"),
+    PackedField("w_rad_s", "f8", unit="rad/s"),
+    PackedField("valid_s", "f8", unit="s, then it is stale"),
+    _LEFT,
+)
 REMOTE_BASE_COMMAND = Topic(
     name="remote_base_command",
     kind=TopicKind.CELL,
     owner="ros",
     rate_hz=20,
     deadline_s=0.25,
-    summary="base velocity wanted from beyond the robot; control takes the younger of the two",
-    fields=(
-        PackedField("v_m_s", "f8", unit="m/s"),
-        PackedField("w_rad_s", "f8", unit="rad/s"),
-        PackedField("valid_s", "f8", unit="s, then it is stale"),
-        _LEFT,
-    ),
+    summary="base velocity wanted from beyond the robot; control takes the youngest there is",
+    fields=_DATED_VELOCITY,
+)
+HAND_BASE_COMMAND = Topic(
+    name="hand_base_command",
+    kind=TopicKind.CELL,
+    owner="cli",
+    rate_hz=20,
+    deadline_s=0.25,
+    summary="base velocity that a person asks for by keys or sticks; control takes the youngest",
+    fields=_DATED_VELOCITY,
 )
 PAGE_SOUND = Topic(
     name="page_sound",

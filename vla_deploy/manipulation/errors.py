@@ -2,7 +2,8 @@
 
 ManipulationError
 ├── PostureUnreachable   stand elsewhere, or use the other hand
-└── TooWide              no grasp fits: choose another object
+├── TooWide              no grasp fits: choose another object
+└── NotFromSide          grasp it from above
 """
 
 
@@ -12,6 +13,10 @@ class ManipulationError(Exception):
 
 class TooWide(ManipulationError):
     """Say that an object does not fit between the fingers."""
+
+
+class NotFromSide(ManipulationError):
+    """Say why an object is not grasped from the side."""
 
 
 class PostureUnreachable(ManipulationError):

@@ -67,6 +67,12 @@ class PathFollower:
         self._segment = 0
         self.phase = FollowerPhase.ALIGN
 
+    def take_up(self, points: NDArray[np.float64]) -> None:
+        """Follow another path from here, without a halt where the base moves along it already."""
+        self._points, self._segment = points, 0
+        if self.phase is not FollowerPhase.TRACK:
+            self.phase = FollowerPhase.ALIGN
+
     def step(self, x_m: float, y_m: float, yaw_rad: float) -> Twist:
         """Return the velocity for this moment; at rest once `phase` is ARRIVED."""
         position = np.array((x_m, y_m))
@@ -124,11 +130,19 @@ class PathFollower:
         return float(np.linalg.norm(legs, axis=1).sum())
 
     def _advance(self, position: NDArray[np.float64]) -> None:
-        """Move on to the next segment once the projection has passed its end."""
+        """Move on to the next segment once the projection has passed its end.
+
+        Looking ahead cuts corners: a short segment at the beginning that was left aside is passed,
+        too, once the one behind it is nearer.
+        """
         while self._segment < len(self._points) - 2:
-            start, end = self._points[self._segment], self._points[self._segment + 1]
-            along = end - start
-            if float((position - end) @ along) < 0.0:
+            start, end, following = self._points[self._segment : self._segment + 3]
+            is_passed = float((position - end) @ (end - start)) >= 0.0
+            begins = self._segment == 0 and float(np.linalg.norm(end - start)) < LOOK_AHEAD_M
+            if not is_passed and begins:
+                next_m = _away_m(position, end, following)
+                is_passed = next_m < _away_m(position, start, end)
+            if not is_passed:
                 return
             self._segment += 1
 
@@ -149,6 +163,13 @@ class PathFollower:
                 return np.asarray(first + (second - first) * (left_m / leg_m))
             left_m -= leg_m
         return np.asarray(self._points[-1])
+
+
+def _away_m(point: Points, start: Points, end: Points) -> float:
+    """Return how far a point is from a segment."""
+    along = end - start
+    share = float((point - start) @ along) / max(float(along @ along), 1e-12)
+    return float(np.linalg.norm(point - start - min(max(share, 0.0), 1.0) * along))
 
 
 def scan_points(ranges_m: NDArray[np.float64]) -> Points:

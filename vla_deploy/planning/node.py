@@ -11,12 +11,7 @@ from platforms import Profile
 from vla_deploy.client.access.audit_log import AuditLog
 from vla_deploy.client.agent_lease import LeaseKeeper
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace, topics
-from vla_deploy.ipc.payloads.tasks import (
-    PlanMessage,
-    PlannerStatus,
-    TaskEvent,
-    Utterance,
-)
+from vla_deploy.ipc.payloads.tasks import PlanMessage, PlannerStatus, TaskEvent, Utterance
 from vla_deploy.memory import MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.keeper import MemoryKeeper
@@ -43,6 +38,7 @@ from vla_deploy.plans.errors import PlanError
 from vla_deploy.robots import RobotDescription
 from vla_deploy.runtime.executors import InlineExecutor, low_priority_thread
 from vla_deploy.runtime.node import NodeContext
+from vla_deploy.world.own_words import OwnWords
 from vla_deploy.world.surfaces import furniture_points
 
 UTTERANCE_AGE_S: Final = 5.0
@@ -73,6 +69,7 @@ class PlannerNode:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
         self._robot = robot
+        self._own_words = OwnWords(robot.words)
         self._run_dir = context.run_dir
         self._planner = planner or Planner(context.clock)
         self._executor = executor or InlineExecutor()
@@ -230,7 +227,7 @@ class PlannerNode:
             )
             self._missions.takes(command, mission)
             return
-        command = read_command(event)
+        command = read_command(event, self._own_words.read)
         if self._manager.dialogue.pending is not None or not self._missions.takes(command):
             self._manager.take(command)
 

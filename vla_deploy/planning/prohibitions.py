@@ -117,13 +117,7 @@ def proposal_of(order: StandingOrder, request: PlanRequest, back_end: str) -> Pr
     """Return the proposal to say that an order stands from now on."""
     said = Action(id="a1", skill="speak", parameters={"text": order.answer})
     plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
-    return Proposal(
-        plan=plan,
-        back_end=back_end,
-        confidence=1.0,
-        covers=None,
-        order=order,
-    )
+    return Proposal(plan=plan, back_end=back_end, confidence=1.0, covers=None, order=order)
 
 
 def held_to(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum
 from types import MappingProxyType
 
+from vla_deploy.manipulation.grasps import GraspKind
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
@@ -16,6 +17,12 @@ RELATIONS = (IN, ON, NEXT_TO)
 MOTIONLESS = frozenset({"speak", "wait", "stop"})
 # These skills switch a device of the home.
 SWITCHING = frozenset({"turn_on", "turn_off"})
+
+
+# Shares of what `pick_up` does by itself: hands never go faster than by feel. Half of the weakest
+# grip is 17 N (0.125 of 1.6 N m at a pinion of 12 mm): two fingers of friction 0.5 carry 1.7 kg.
+SPEED_RATIOS = (0.3, 1.0)
+FORCE_RATIOS = (0.5, 1.3)
 
 
 class SkillKind(StrEnum):
@@ -49,6 +56,7 @@ class Type(Enum):
     DESTINATION = "a known object or a known place"
     DEVICE = "a known device of the home"
     CHOICE = "one of a list"
+    FLAG = "true or false"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,6 +150,27 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             own_timeout_s=2000.0,
             estimated_duration_s=60.0,
         ),
+        "guard": SkillSpec(
+            kind=SkillKind.NAVIGATION,
+            summary="stand here or at a place, and report each person who comes in",
+            parameters={
+                "place": SkillParameter(type=Type.PLACE, required=False),
+                "duration_s": _number(0, 1800, required=False),
+            },
+            resources=("base", "head", "camera", "arms"),
+            finds_way=True,
+            own_timeout_s=2200.0,
+            estimated_duration_s=60.0,
+        ),
+        "inspect": SkillSpec(
+            kind=SkillKind.NAVIGATION,
+            summary="look at an object from two sides, and tell what was seen from each",
+            parameters={"object": _OBJECT},
+            resources=("base", "head", "camera", "arms"),
+            finds_way=True,
+            estimated_duration_s=30.0,
+            retryable=True,
+        ),
         "sweep": SkillSpec(
             kind=SkillKind.NAVIGATION,
             summary="drive over all the floor of a place, and tell which share was covered",
@@ -190,7 +219,14 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         "pick_up": SkillSpec(
             kind=SkillKind.MANIPULATION,
             summary="grasp an object within reach and verify the grasp",
-            parameters={"object": _OBJECT, "arm": _ARM},
+            parameters={
+                "object": _OBJECT,
+                "arm": _ARM,
+                "grasp": _choice(*GraspKind, required=False),
+                "careful": SkillParameter(type=Type.FLAG, required=False),
+                "speed_ratio": _number(*SPEED_RATIOS, required=False),
+                "force_ratio": _number(*FORCE_RATIOS, required=False),
+            },
             resources=("base", "head", "camera", "arms"),
             may_lack=_MOUNTED,
             estimated_duration_s=15.0,

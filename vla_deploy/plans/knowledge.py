@@ -8,6 +8,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
+from vla_deploy.manipulation.grasps import takes_from_side
 from vla_deploy.plans.catalogue import SKILLS
 from vla_deploy.plans.errors import DependsOnView, UnknownObject
 from vla_deploy.robots import RobotDescription
@@ -77,8 +78,9 @@ class World:
     named poses; `holding` is which kind of object each hand holds, and is empty where that is not
     known. `is_free` returns whether the base fits on a point of the map; None means that no map is
     at hand. A gripper opens `opening_max_m` wide and takes things within `reach`; None where that
-    is not known. The robot charges at the place `station`, where it has one. `skills` are those
-    that its body is able to; `lacks` says of each other one which parts it would need.
+    is not known; from the side, too, where an arm has the joints for it. The robot charges at the
+    place `station`, where it has one. `skills` are those that its body is able to; `lacks` says of
+    each other one which parts it would need.
     """
 
     places: Mapping[str, str]
@@ -90,6 +92,7 @@ class World:
     footprint_radius_m: float = 0.0
     max_speed_m_s: float | None = None
     opening_max_m: float | None = None
+    takes_from_side: bool = True
     reach: Reach | None = None
     bounds: PlanBounds = NOT_BOUNDED
     is_free: IsFree | None = None
@@ -218,6 +221,7 @@ def world_of(
         footprint_radius_m=base.footprint_radius_m if base else 0.0,
         max_speed_m_s=base.max_speed_m_s if base else 0.0,
         opening_max_m=max(openings_m, default=None),
+        takes_from_side=any(takes_from_side(robot, hand) for hand in robot.hands),
         reach=robot.parts.reach,
         bounds=robot.planning,
         is_free=is_free,

@@ -3,10 +3,12 @@
 import math
 from typing import Any
 
+from vla_deploy.manipulation.grasps import GraspKind, shape_refusal
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES, SKILLS, SkillParameter, SkillSpec, Type
 from vla_deploy.plans.errors import PlanError, PlanInvalid, UnknownObject
 from vla_deploy.plans.knowledge import World, match_device, match_place, parse_object
 from vla_deploy.plans.plan import Action, Plan, dependency_faults
+from vla_deploy.plans.symbolic.conditions import not_from_side
 from vla_deploy.plans.symbolic.simulation import (
     bounds_faults,
     symbolic_faults,
@@ -99,6 +101,9 @@ def _sense_faults(action: Action, world: World) -> list[str]:
         kind = parse_object(str(action.parameters["object"])).kind
         if kind not in GRASPABLE_CLASSES:
             return [f"a {kind} is too large to grasp; graspable: {', '.join(GRASPABLE_CLASSES)}"]
+        if action.parameters.get("grasp") == GraspKind.SIDE:
+            why = not_from_side(world) or shape_refusal(kind)
+            return [f"grasp side: {why}"] if why else []
     return []
 
 
@@ -114,6 +119,8 @@ def _value_faults(name: str, value: Any, parameter: SkillParameter, world: World
         case Type.CHOICE:
             ok = value in parameter.choices
             return [] if ok else [f"{name} must be one of {', '.join(parameter.choices)}"]
+        case Type.FLAG:
+            return [] if isinstance(value, bool) else [f"{name} must be true or false"]
         case Type.PLACE:
             return _place_faults(name, value, world)
         case Type.OBJECT:

@@ -27,7 +27,7 @@ from vla_deploy.robots.devices import (
 from vla_deploy.robots.errors import PartMissing
 from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.robots.home_devices import HomeDevice, MqttBroker
-from vla_deploy.robots.known_things import KnownThing
+from vla_deploy.robots.known_things import KnownThing, OwnWord
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 from vla_deploy.robots.reach import Reach
@@ -249,6 +249,7 @@ class RobotDescription:
     """What the robot switches in its home, by name."""
     things: tuple[KnownThing, ...] = ()
     """What it knows the size of."""
+    words: tuple[OwnWord, ...] = ()
     against_stops: Mapping[str, StopApproach] = field(default_factory=dict)
     """Which joints may be calibrated by driving them against their stops, and how."""
 

@@ -1,4 +1,7 @@
-"""Describe the things whose size is known: a camera without depth places things by them."""
+"""Describe what an owner says of things: their size, and what they are called in this home.
+
+A camera without depth places things by their size.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +18,7 @@ SIZE = ValueCheck(
     ),
 )
 THING: Shape = {"class": TEXT, "size_m": SIZE}
+WORD: Shape = {"said": TEXT, "means": TEXT}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,6 +27,14 @@ class KnownThing:
 
     class_name: str
     size_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnWord:
+    """Say what a word, or a few, stand for in this home: "thermos", "green bottle"."""
+
+    said: str
+    means: str
 
 
 def read_things(rows: list[Mapping[str, Any]]) -> tuple[KnownThing, ...]:

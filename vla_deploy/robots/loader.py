@@ -94,6 +94,7 @@ SHAPES: Mapping[str, Shape] = {
     "home.zones": schema.ZONE,
     "planning": schema.PLANNING,
     "things": known_things.THING,
+    "words": known_things.WORD,
     "zones.*": protection_schema.ZONE,
     "workspace.*": protection_schema.WORKSPACE,
     "clearance": protection_schema.CLEARANCE,
@@ -262,6 +263,7 @@ def _build(
         against_stops=stop_approach.read_approaches(document),
         broker=_broker(document.get("mqtt"), directory),
         things=known_things.read_things(document.get("things", [])),
+        words=tuple(build(known_things.OwnWord, row) for row in document.get("words", [])),
         devices={row["name"]: _home_device(row, directory) for row in document.get("devices", ())},
     )
 

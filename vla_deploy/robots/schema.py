@@ -60,6 +60,7 @@ ROBOT: Shape = {
     "mqtt": TABLE.optional,
     "devices": TABLES.optional,
     "things": TABLES.optional,
+    "words": TABLES.optional,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE.optional,

@@ -7,11 +7,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.control.judging.body_shapes import BodyShapes
 from vla_deploy.devices import HomeDevices
 from vla_deploy.ipc import Announcer, ClaimBook
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.floor_pose import Pose2D
 from vla_deploy.skills.errors import NotPossible
 from vla_deploy.skills.link import SkillLink
 from vla_deploy.skills.ros_goals import RosGoals
@@ -28,13 +30,15 @@ Rest = Callable[[], Mapping[str, float]]
 class Held:
     """Say what a hand holds and how it is held.
 
-    `below_grip_m` is how far the object reaches below the grip point when the hand points down.
+    `below_grip_m` is how far the object reaches below the grip point while it is upright, as it
+    was when taken: the hand is then tilted by `tilt_rad` from straight down (`hand_at`).
     """
 
     kind: str
     colour: str
     width_m: float
     below_grip_m: float
+    tilt_rad: float = 0.0
 
 
 @dataclass(slots=True, kw_only=True)
@@ -48,7 +52,8 @@ class SkillContext:
     follows none. `holder` is the claim of the acting action, `ros` the way to servers beyond the
     robot, where the robot file names any. `keeps_out` are the places that the plan may not enter,
     `devices` those of the home that are switched. `out_of_reach` are the things that the base found
-    no place to take them from, by id, with when that was, ns.
+    no place to take them from, by id, with when that was, ns; `looked` is when each viewpoint's
+    furniture was last looked at, ns. `shapes` are the robot's, once a way has been judged by them.
     """
 
     robot: RobotDescription
@@ -69,6 +74,8 @@ class SkillContext:
     devices: HomeDevices | None = None
     needs: dict[str, Mapping[str, int]] = field(default_factory=dict)
     out_of_reach: dict[str, int] = field(default_factory=dict)
+    looked: dict[Pose2D, int] = field(default_factory=dict)
+    shapes: BodyShapes | None = None
 
     def keep_only(self, hand: str) -> None:
         """Leave all but the base and one arm, with its hand, to others for a phase of the action.

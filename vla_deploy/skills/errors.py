@@ -4,6 +4,8 @@ SkillFailed
 ├── TryAgain         the world may be kinder a second time: not found, grasp lost, way blocked
 │   ├── EffectMissing    the skill came to its end, and the world does not show what it should
 │   ├── Touched          an arm that felt its way has met something, and stands before it
+│   ├── NotHeld          the fingers have closed, and do not hold what they should
+│   ├── NotThere         a thing is not where it was seen
 │   └── ServerAborted    a server beyond the robot gave its goal up
 ├── NotPossible      the same try would fail the same way: out of reach, hands full
 │   ├── OutOfReach   standing elsewhere may help
@@ -36,6 +38,14 @@ class EffectMissing(TryAgain):
 
 class Touched(TryAgain):
     """Say what an arm has met on a way that it thought free."""
+
+
+class NotHeld(TryAgain):
+    """Say what the fingers feel instead of what they should hold."""
+
+
+class NotThere(TryAgain):
+    """Say what is not where it was seen."""
 
 
 class ServerAborted(TryAgain):

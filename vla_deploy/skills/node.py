@@ -386,4 +386,5 @@ def _grip(held: Held) -> GripDocument:
         "colour": held.colour,
         "width_m": held.width_m,
         "below_grip_m": held.below_grip_m,
+        "tilt_rad": held.tilt_rad,
     }

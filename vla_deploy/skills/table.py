@@ -5,7 +5,9 @@ from types import MappingProxyType
 from vla_deploy.skills.actions.charge import charge
 from vla_deploy.skills.actions.find import find_object
 from vla_deploy.skills.actions.follow import follow_person
+from vla_deploy.skills.actions.guard import guard
 from vla_deploy.skills.actions.hand_over import hand_over
+from vla_deploy.skills.actions.inspect import inspect
 from vla_deploy.skills.actions.navigate import navigate_to
 from vla_deploy.skills.actions.pick import pick_up
 from vla_deploy.skills.actions.place import place
@@ -22,6 +24,8 @@ SKILL_FUNCTIONS: MappingProxyType[str, SkillFunction] = MappingProxyType(
         "navigate_to": navigate_to,
         "charge": charge,
         "follow_person": follow_person,
+        "guard": guard,
+        "inspect": inspect,
         "sweep": sweep,
         "move": move,
         "turn": turn,

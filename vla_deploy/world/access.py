@@ -10,7 +10,14 @@ from enum import StrEnum
 from typing import Any, Final, Self
 
 from vla_deploy.manipulation.errors import TooWide
-from vla_deploy.manipulation.grasps import TIP_BEYOND_GRIP_M, Grasp, grasps_from_above
+from vla_deploy.manipulation.grasps import (
+    TIP_BEYOND_GRIP_M,
+    Grasp,
+    grasps_from_above,
+    side_grip_m,
+    side_refusal,
+    takes_from_side,
+)
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.reach import Reach
 from vla_deploy.world.footprint import depth_inside_m
@@ -98,6 +105,7 @@ class Body:
     hands: tuple[str, ...]
     reach: Reach | None
     is_free: IsFree | None = None
+    takes_from_side: bool = True
 
     @classmethod
     def of(cls, robot: RobotDescription, is_free: IsFree | None) -> Self:
@@ -108,6 +116,7 @@ class Body:
             hands=tuple(robot.hands),
             reach=robot.parts.reach,
             is_free=is_free,
+            takes_from_side=any(takes_from_side(robot, hand) for hand in robot.hands),
         )
 
 
@@ -138,7 +147,7 @@ def access_to(thing: Thing, snapshot: Snapshot, body: Body) -> GraspAccess:
     """Judge one thing; the obstacles are in the order in which one would clear them."""
     grasps, too_wide = _grasps(thing, body)
     way = grasp_stand(thing, snapshot.robot, body.is_free, body.reach)
-    found = [*_general(thing, snapshot, body), *too_wide, *_height(grasps, body.reach)]
+    found = [*_general(thing, snapshot, body), *too_wide, *_height(thing, grasps, body)]
     found += _in_corridor(thing, grasps, snapshot) if grasps else []
     if way is GraspStand.NONE:
         found.append(Obstacle(Bar.NO_STAND, "", "no free floor from which the arms reach it"))
@@ -169,13 +178,21 @@ def _grasps(thing: Thing, body: Body) -> tuple[list[Grasp], list[Obstacle]]:
         return [], [Obstacle(Bar.TOO_WIDE, "", str(error))]
 
 
-def _height(grasps: list[Grasp], reach: Reach | None) -> Iterator[Obstacle]:
+def _height(thing: Thing, grasps: list[Grasp], body: Body) -> Iterator[Obstacle]:
+    reach = body.reach
     for grasp in grasps[:1]:
         height_m = grasp.point_m[2]
         why = "" if reach is None else reach.height_refusal(height_m)
-        if reach is not None and why:
+        if reach is not None and why and not _is_taken_from_side(thing, body):
             is_low = height_m < reach.grip_heights_m[0]
             yield Obstacle(Bar.TOO_LOW if is_low else Bar.TOO_HIGH, "", why)
+
+
+def _is_taken_from_side(thing: Thing, body: Body) -> bool:
+    """Return whether a hand gets to the side of a thing of which the top is too high or low."""
+    height_m = thing.bottom_m + side_grip_m(thing.size_m)
+    can_be = body.takes_from_side and not side_refusal(thing.kind, thing.size_m)
+    return can_be and body.reach is not None and not body.reach.height_refusal(height_m)
 
 
 def grasp_stand(

@@ -18,7 +18,7 @@ from sim_twin.campaigns.faulting.phases import NotSet, PhaseStage
 from sim_twin.campaigns.faulting.separation import Separation
 from sim_twin.campaigns.faulting.witness import FaultWitness
 from sim_twin.campaigns.processes import played
-from sim_twin.campaigns.report import CampaignCase, CampaignReport
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure
 from sim_twin.campaigns.selection import chosen
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
@@ -118,6 +118,7 @@ def _is_possible(cell: Cell, robot: RobotDescription) -> bool:
     return True
 
 
+@crash_is_failure
 def play(
     cell: Cell, seed: int = 0, robot: str = "butler", watch: Watch = unwatched
 ) -> CampaignCase:

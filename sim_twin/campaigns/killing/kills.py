@@ -19,9 +19,8 @@ from drivers.clock import NS_PER_S
 from sim_twin.campaigns.killing.moment import Work
 from sim_twin.campaigns.killing.rest import RestWatch
 from sim_twin.campaigns.killing.rules import RULES, Injection, KillRule, injections, rule_of
-from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure, told
 from sim_twin.campaigns.selection import chosen
-from sim_twin.harness.robot import RobotFailed
 from sim_twin.harness.service import Machine, RobotService
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.table import RestartPolicy
@@ -168,17 +167,15 @@ def _inject_on_one_machine(
         contextlib.closing(KillCampaign(Path(folder), seed, robot)) as campaign,
     ):
         return [
-            told(_injected(campaign, injection), tell)
+            told(_injected(injection, campaign), tell)
             for injection in drawn
             if not is_over.is_set()
         ]
 
 
-def _injected(campaign: KillCampaign, injection: Injection) -> CampaignCase:
-    try:
-        return campaign.inject(injection)
-    except RobotFailed as error:
-        return CampaignCase(name=injection.name, failures=(str(error),))
+@crash_is_failure  # for the next one the robot is made ready anew
+def _injected(injection: Injection, campaign: KillCampaign) -> CampaignCase:
+    return campaign.inject(injection)
 
 
 def _share(met: Sequence[Mapping[str, Any]], is_so: Callable[[Mapping[str, Any]], object]) -> float:

@@ -14,11 +14,11 @@ from sim_twin.campaigns.pressing.judge import judge, listed
 from sim_twin.campaigns.pressing.pressed_scene import CannotPress, PressedScene
 from sim_twin.campaigns.pressing.trial import PressureTrial
 from sim_twin.campaigns.pressing.troubles import TROUBLES, Trouble
-from sim_twin.campaigns.report import CampaignCase, CampaignReport, told
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure, told
 from sim_twin.campaigns.selection import chosen
-from sim_twin.harness.robot import RobotFailed
 
 
+@crash_is_failure
 def play(trouble: Trouble, seed: int) -> CampaignCase:
     """Give one trouble to a robot of its own and judge what follows."""
     clock = MonotonicClock()
@@ -29,8 +29,6 @@ def play(trouble: Trouble, seed: int) -> CampaignCase:
             seen = PressureTrial(trouble, scene).run()
     except CannotPress as error:
         return CampaignCase(name=trouble.name, skipped=str(error))
-    except RobotFailed as error:
-        return CampaignCase(name=trouble.name, failures=(str(error),))
     figures = {
         "late_ratio_before": seen.before.late_ratio,
         "late_ratio_during": seen.during.late_ratio,

@@ -158,6 +158,7 @@ SHORT: Final = (
     "button/empty/arm_moving",
     "can_bus_lost/empty/driving",
     "control_killed/empty/driving",
+    "control_killed/empty/arm_moving",
     "wire/request/idle",
     "wire/page/idle",
     "wire/door/idle",

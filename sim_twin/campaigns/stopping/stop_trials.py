@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_twin.campaigns.faulting.phases import NotSet, PhaseStage
-from sim_twin.campaigns.report import CampaignCase
+from sim_twin.campaigns.report import CampaignCase, crash_is_failure
 from sim_twin.campaigns.stopping.cells import SOURCES, HandLoad, StopCell, StopPhase, StopSource
 from sim_twin.harness.lockstep_stack import LockstepControl, lockstep_robot
 from sim_twin.harness.robot import RobotFailed
@@ -70,6 +70,7 @@ class StopTrial:
     failures: tuple[str, ...]
 
 
+@crash_is_failure
 def play(cell: StopCell, seed: int, count: int, robot: str) -> CampaignCase:
     """Stop a robot of its own `count` times in one cell."""
     trials: list[StopTrial] = []

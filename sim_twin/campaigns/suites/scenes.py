@@ -7,10 +7,9 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns import demos, missions, navigation
 from sim_twin.campaigns.evidence import SceneEvidence, SceneWatch, Watch
-from sim_twin.campaigns.report import CampaignCase
-from sim_twin.campaigns.suites import safety, voice
+from sim_twin.campaigns.report import CampaignCase, crashed
+from sim_twin.campaigns.suites import grasping, safety, voice
 from sim_twin.campaigns.suites.report import ScoredCase
-from sim_twin.harness.robot import RobotFailed
 
 ALL: Final = "all"
 _CONTACTS: Final = ("touches", "pushes")
@@ -63,7 +62,9 @@ def _drive(scene: str, seed: int, watch: Watch) -> CampaignCase:
     return navigation.play(f"{scene}/{seed}", watch)
 
 
-def _demo(scene: str, seed: int, _watch: Watch) -> CampaignCase:
+def _manipulate(scene: str, seed: int, watch: Watch) -> CampaignCase:
+    if scene == grasping.SCENE:
+        return grasping.play(scene, seed, watch)
     return demos.play(seed, scene)
 
 
@@ -87,7 +88,9 @@ SUITES: Final[Mapping[str, SceneSuite]] = {
         },
     ),
     "manipulation": SceneSuite(
-        scenes=("butler", "so101"), play=_demo, metrics={"placement_mm": _placement_mm}
+        scenes=("butler", "so101", grasping.SCENE),
+        play=_manipulate,
+        metrics={"placement_mm": _placement_mm},
     ),
     "integration": SceneSuite(
         scenes=("documents", "side_by_side", "paused/pick_up"),
@@ -125,8 +128,8 @@ def play(case: SuiteScene) -> ScoredCase:
     begun_ns = clock.now_ns()
     try:
         played = suite.play(case.scene, case.seed, watch)
-    except RobotFailed as error:
-        played = CampaignCase(name=case.name, failures=(f"the robot failed: {error}",))
+    except Exception as error:  # the other scenes are played all the same
+        played = crashed(case.name, error)
     return scored(case, played, watch.evidence, (clock.now_ns() - begun_ns) / NS_PER_S)
 
 

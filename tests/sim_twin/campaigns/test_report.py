@@ -4,7 +4,9 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-from sim_twin.campaigns.report import CampaignCase, CampaignReport
+import pytest
+
+from sim_twin.campaigns.report import CampaignCase, CampaignReport, crash_is_failure
 
 GOOD = CampaignCase(name="servo_bus/off/idle", figures={"rest_s": 0.5}, seconds=3.5)
 BAD = CampaignCase(name="drive/stuck/driving", failures=("fall red_cup: 2, limit 1", "moved on"))
@@ -47,3 +49,18 @@ def test_junit_names_cases_failures_and_time(tmp_path: Path) -> None:
     assert good.find("failure") is None
     (why,) = skipped.findall("skipped")
     assert why.get("message") == SKIPPED.skipped
+
+
+@crash_is_failure
+def _play(name: str, divisor: int) -> CampaignCase:
+    return CampaignCase(name=name, figures={"share": 1 / divisor})
+
+
+def test_what_a_case_raises_is_its_failure(capsys: pytest.CaptureFixture[str]) -> None:
+    assert _play("whole", divisor=2).failures == ()
+    broken = _play("broken", divisor=0)
+    assert (broken.name, broken.failures) == (
+        "broken",
+        ("crashed: ZeroDivisionError: division by zero",),
+    )
+    assert "Traceback" in capsys.readouterr().err

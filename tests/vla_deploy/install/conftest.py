@@ -30,6 +30,7 @@ ldconfig
 mount -t tmpfs tmpfs /run
 mount -t tmpfs tmpfs /var/lib
 mount -t tmpfs tmpfs /var/log
+mount -t tmpfs tmpfs /var/tmp
 exec env -i container=test PATH=/usr/sbin:/usr/bin:/sbin:/bin \
   SYSTEMD_UNIT_PATH=/etc/systemd/system /lib/systemd/systemd \
   --system --unit=test.target --log-target=console --log-level=info \
@@ -153,6 +154,7 @@ def boot(image: Path) -> Iterator[Callable[[], Computer]]:
     group = mount / f"test-{os.getpid()}"
     group.mkdir()
     started: list[subprocess.Popen[bytes]] = []
+    others = set(_private_folders())
 
     def start() -> Computer:
         script = BOOT.format(
@@ -174,6 +176,13 @@ def boot(image: Path) -> Iterator[Callable[[], Computer]]:
         process.kill()
         process.wait()
     _remove_group(group)
+    for folder in set(_private_folders()) - others:  # a systemd that is killed leaves them
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _private_folders() -> Iterator[Path]:
+    """Return the folders that services have here as their /tmp; tests' own files are beside."""
+    return Path("/tmp").glob("systemd-private-*-vla-deploy*")
 
 
 def _first(children: Path) -> int:

@@ -74,6 +74,23 @@ def test_a_cornered_path_ends_at_its_point_and_heading(start_yaw: float) -> None
     assert off_m < 0.2
 
 
+def test_a_short_step_aside_at_the_beginning_is_passed() -> None:
+    points = [(0, 0), (-0.024, 0.028), (0.126, 0.178), (0.576, 0.178), (0.876, -0.022), (2, -1.1)]
+    end_m, _, off_m = run(points, -1.57, 0.0)
+    assert end_m < 0.05
+    assert off_m < 0.2
+
+
+def test_a_way_planned_anew_is_taken_up_without_a_halt() -> None:
+    follower = PathFollower(np.array([(0.0, 0.0), (3.0, 0.0)]), LIMITS)
+    assert follower.step(0.0, 0.0, 0.0).v_m_s > 0.0
+    follower.take_up(np.array([(0.1, 0.0), (1.0, 0.3), (3.0, 0.5)]))
+    curved = follower.step(0.1, 0.0, 0.0)
+    assert curved.v_m_s > 0.0 and curved.w_rad_s > 0.0
+    follower.take_up(np.array([(0.1, 0.0), (-1.0, 0.0)]))
+    assert follower.step(0.1, 0.0, 0.0).v_m_s == 0.0
+
+
 @settings(max_examples=25, deadline=None)
 @given(
     x=st.floats(-2, 2).filter(lambda v: abs(v) > 0.2),

@@ -119,6 +119,7 @@ class Desk:
         self.executor = executor
         self.memory = memory
         self.audit: AuditLog | None = None
+        self.robot = butler()
         self.space = SharedSpace(run_dir / "ipc", clock)
         self._context = NodeContext(
             run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
@@ -142,7 +143,7 @@ class Desk:
         planner = Planner(self.clock, self._slow, within_s=20.0, check=self._check)
         self.planner = PlannerNode(
             self._context,
-            butler(),
+            self.robot,
             planner,
             self.executor,
             self.memory,

@@ -1,9 +1,12 @@
 """Talk to the planner through its topics, on a time that only the test moves."""
 
+import dataclasses
+
 import pytest
 
 from platforms import load_profile
 from vla_deploy.planning.node import AWAY, UTTERANCE_AGE_S
+from vla_deploy.robots.known_things import OwnWord
 
 
 def test_a_command_becomes_a_plan_for_the_executor(desk):
@@ -51,6 +54,16 @@ def test_why_nobody_planned_it_is_told(desk):
     assert refused["event"] == "rejected"
     assert refused["reason"].startswith('I do not understand "sing a sea shanty"')
     assert [one["rung"] for one in refused["attempts"]] == ["patterns"]
+
+
+def test_a_word_of_the_homes_own_is_read_as_what_it_means(desk):
+    word = OwnWord(said="thermos", means="green bottle")
+    desk.robot = dataclasses.replace(desk.robot, words=(word,))
+    desk.start()
+    desk.sees("green bottle_1", "red bottle_2")
+    (plan,) = desk.plans_for("Pick up the Thermos.")
+    picked = plan["plan"]["actions"][-1]
+    assert (picked["skill"], picked["parameters"]["object"]) == ("pick_up", "green bottle")
 
 
 def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):

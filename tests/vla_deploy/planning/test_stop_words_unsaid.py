@@ -15,7 +15,9 @@ from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.speech.words import STOPS
 
 PACKAGE: Final = Path(vla_deploy.__file__).parent
-SPEAKERS: Final = ("planning", "plans", "memory", "world", "speech/event_publisher.py")
+SPEAKERS: Final = (
+    "planning", "plans", "memory", "world", "skills/actions", "speech/event_publisher.py",
+)  # fmt: skip
 """Where sentences stand that are said aloud."""
 NOT_SAID: Final = frozenset(
     {

@@ -86,7 +86,9 @@ class StandingLink:
     hands: dict[str, Any] = field(default_factory=dict)
     positions: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     efforts: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    setpoints: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     is_silent: bool = False
+    acting: str = ""
     place_state: PlaceState = PlaceState.TRACKING
 
     def working_ns(self) -> int:

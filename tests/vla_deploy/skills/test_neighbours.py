@@ -3,7 +3,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from vla_deploy.manipulation.grasps import Grasp, grasps_from_above
+from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, grasps_from_side
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.movements.neighbours import crowding_m
 
@@ -67,3 +67,36 @@ def test_other_things_leave_all_the_room(
     kind: str,
 ) -> None:
     assert max(crowdings(context, standing, cup_m, kind)) == 0.0
+
+
+BOTTLE_M, BOTTLE_SIZE_M = (0.45, 0.10, 0.59), (0.056, 0.056, 0.18)
+
+
+@pytest.mark.parametrize(
+    ("at_m", "size_m", "tilt_rad", "bars"),
+    [
+        pytest.param((0.30, 0.10, 0.55), CUP_SIZE_M, 1.571, True, id="on the way in"),
+        pytest.param((0.45, 0.18, 0.55), CUP_SIZE_M, 1.571, True, id="beside the fingers"),
+        pytest.param((0.45, 0.23, 0.55), CUP_SIZE_M, 1.571, False, id="clear of the fingers"),
+        pytest.param((0.57, 0.10, 0.55), CUP_SIZE_M, 1.571, False, id="behind it"),
+        pytest.param((0.30, 0.10, 0.52), (0.05, 0.05, 0.05), 1.571, False, id="under the hand"),
+        pytest.param((0.30, 0.10, 0.80), CUP_SIZE_M, 1.571, False, id="on a shelf above"),
+        pytest.param((0.30, 0.10, 0.55), CUP_SIZE_M, 0.785, False, id="under an inclined hand"),
+    ],
+)
+def test_from_the_side_all_that_stands_in_the_way_of_the_hand_counts(
+    context: SkillContext,
+    standing: "StandingLink",
+    at_m: tuple[float, float, float],
+    size_m: tuple[float, float, float],
+    tilt_rad: float,
+    bars: bool,
+) -> None:
+    bottle = thing(standing, BOTTLE_M, "bottle", BOTTLE_SIZE_M)
+    cup, unknown = (thing(standing, at_m, kind, size_m) for kind in ("cup", "object"))
+    shoulder_m = (0.0, BOTTLE_M[1], 0.9)
+    ahead = grasps_from_side("bottle", BOTTLE_M, BOTTLE_SIZE_M, shoulder_m, 0.088, tilt_rad)
+    for other in (cup, unknown):
+        standing.objects = [bottle, other]
+        for grasp in ahead[:2]:
+            assert (crowding_m(context, grasp, bottle) > 0.01) == bars

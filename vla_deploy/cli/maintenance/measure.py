@@ -35,7 +35,7 @@ CAMPAIGNS: Final = {
     "kills": "kill -9, SIGSTOP and SIGTERM of every process at random moments",
     "load": "the main job repeatedly, with eight busy loops: only its duration may change",
     "missions": "whole missions in lock-step: side by side, paused, as the documents have them",
-    "navigation": "drives around what is on no map, following, sweeping",
+    "navigation": "drives around what is on no map, following, sweeping, guarding, inspecting",
     "power-cuts": "the power goes at each operation of `release`: what boots has to run",
     "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
     "switches": "hot profile switches under motion, and bad profiles",
@@ -46,7 +46,7 @@ CAMPAIGNS: Final = {
 SUITES: Final = {
     "voice": "spoken commands, understood and executed",
     "navigation": "drives, around a chair, past somebody, following",
-    "manipulation": "the jobs of `demo` of Butler and of an arm on a table",
+    "manipulation": "the jobs of `demo` of Butler and of an arm on a table, a bottle from the side",
     "integration": "whole missions, also side by side and paused",
     "safety": "stops, a shove, and a few faults in motion",
     "all": "all of them",
@@ -57,6 +57,7 @@ _VALIDATE_EXAMPLES: Final = """  vla-deploy validate demos --robot so101
   vla-deploy validate kills --count 20 --junit out/kills.xml
   vla-deploy validate stops --short --report out
   vla-deploy validate suite all --html out/suite.html
+  vla-deploy validate suite manipulation --only side_grasp --count 10
   vla-deploy validate suite navigation --json --compare out/earlier.json
 """
 _PASSED_ON: Final = (

@@ -1,4 +1,4 @@
-"""Judge of a robot file what takes more than reading it: kinematics, the twin's worlds."""
+"""Judge of a robot file what takes more than reading it: kinematics, words, the twin's worlds."""
 
 import tomllib
 from collections.abc import Iterator
@@ -9,15 +9,16 @@ from vla_deploy.manipulation.downward_reach import reach_faults
 from vla_deploy.robots import RobotDescription, RobotFileError
 from vla_deploy.robots.loader import robot_file
 from vla_deploy.runtime.table_schema import TableFault
+from vla_deploy.world.own_words import word_faults
 
 
 def require_usable(robot: RobotDescription, name: str) -> None:
-    """Refuse a robot whose hands do not get to its `[reach]`, or whose twin has no such world.
+    """Refuse a robot whose hands do not get to its `[reach]`, or whose words or world are none.
 
     Raises:
         RobotFileError: with all faults; `name` is how the command named the robot.
     """
-    faults = (*reach_faults(robot, name), *_world_faults(robot))
+    faults = (*reach_faults(robot, name), *word_faults(robot), *_world_faults(robot))
     if faults:
         raise RobotFileError(robot_file(name), faults)
 

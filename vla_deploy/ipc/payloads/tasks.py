@@ -298,6 +298,7 @@ class GripDocument(TypedDict):
     colour: str
     width_m: float
     below_grip_m: float
+    tilt_rad: float
 
 
 class ExecutorStatus(TypedDict):

@@ -68,7 +68,8 @@ class LiveObstacles:
         sure = [cell for cell, one in self._cells.items() if one.scans >= ENOUGH_SCANS]
         middles: Points = (np.array(sure, dtype=np.float64).reshape(-1, 2) + 0.5) * CELL_M
         order = np.argsort(np.hypot(*(middles - at).T), kind="stable")
-        return middles[order]
+        nearest_first: Points = middles[order]
+        return nearest_first
 
     def left(self, stamp_ns: int) -> Points:
         """Return rows of stamp (ns), x, y: where what moves has been, and is no more."""

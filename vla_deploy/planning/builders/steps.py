@@ -23,6 +23,7 @@ from vla_deploy.planning.understanding.quantities import UNITS, amount_of, quant
 from vla_deploy.plans.errors import PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.plans.knowledge import match_devices, match_place
 from vla_deploy.plans.plan import Skill
+from vla_deploy.plans.table_setting import DEFAULT, set_table
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
@@ -117,6 +118,10 @@ class Steps:
         if value is None:
             raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
         return value
+
+    def time(self, step: Step) -> dict[str, float]:
+        """Return how long a step says that it shall take, nothing where it does not."""
+        return {"duration_s": self.amount(step, "s", DEFAULT_WAIT_S)} if "by" in step else {}
 
 
 def is_seen(text: str, request: PlanRequest) -> bool:
@@ -292,18 +297,24 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "pose": _pose,
     "switch": _switch,
     "say": _say,
-    "wait": lambda spoken, step: [
-        ("wait", {"duration_s": spoken.amount(step, "s", DEFAULT_WAIT_S)})
-    ],
+    "wait": lambda spoken, step: [("wait", {"duration_s": DEFAULT_WAIT_S, **spoken.time(step)})],
     "stop": lambda _spoken, _step: [("stop", {})],
-    "follow": lambda spoken, step: [
-        ("follow_person", {"duration_s": spoken.amount(step, "s", 0.0)} if "by" in step else {})
+    "follow": lambda spoken, step: [("follow_person", spoken.time(step))],
+    "inspect": lambda spoken, step: [("inspect", {"object": spoken.spoken(step, "what")})],
+    "guard": lambda spoken, step: [
+        ("guard", {**({"place": step["where"]} if "where" in step else {}), **spoken.time(step)})
     ],
     "ask": _answer,
     "tidy": lambda spoken, step: tidy(spoken.fields(step, "where", "except"), spoken.request),
     "patrol": lambda _spoken, step: [
         one for name in ("where", "then") if name in step for one in look_around(step[name])
     ],
+    "set": lambda spoken, step: set_table(
+        step.get("where", "the table"),
+        step.get("by", DEFAULT),
+        spoken.request.world,
+        spoken.request.scene,
+    ),
     "sweep": lambda _spoken, step: [("sweep", {"place": step["where"]})],
     "await": lambda _spoken, _step: [],
     "forbid": _refused(CannotBeDone, "say by itself what I shall not do from now on"),

@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 from typing import Final
 
-from vla_deploy.manipulation.errors import TooWide
-from vla_deploy.manipulation.grasps import SIZE_DOUBT_M, require_fit
 from vla_deploy.planning.interfaces import PlanRequest
 from vla_deploy.planning.understanding.fitting import CommandContext, ThingUse, fitting
 from vla_deploy.plans.catalogue import GRASPABLE_CLASSES
 from vla_deploy.plans.errors import UnknownPlace
 from vla_deploy.plans.knowledge import match_place, words_of
 from vla_deploy.plans.plan import Skill
+from vla_deploy.plans.table_setting import is_too_wide
 from vla_deploy.world import Thing
 
 STORE: Final = "box"
@@ -33,7 +32,7 @@ def tidy(fields: Mapping[str, str], request: PlanRequest) -> list[Skill]:
     if not lying:
         said = "I know of nothing there to put away. I look around."
         return [("speak", {"text": said}), *look_around(fields.get("where"))]
-    wide = [one for one in lying if _is_too_wide(one, request)]
+    wide = [one for one in lying if is_too_wide(one, request.world)]
     narrow = [one for one in lying if one not in wide]
     where = {"destination": STORE, "relation": "in"}
     steps: list[Skill] = [
@@ -47,17 +46,6 @@ def tidy(fields: Mapping[str, str], request: PlanRequest) -> list[Skill]:
         f"What is too wide for my hands stays: {kinds}." if wide else "",
     )
     return [*steps, ("speak", {"text": " ".join(filter(None, told))})]
-
-
-def _is_too_wide(thing: Thing, request: PlanRequest) -> bool:
-    opening_m = request.world.opening_max_m
-    if opening_m is None:
-        return False
-    try:
-        require_fit(thing.kind, thing.size_m, opening_m, SIZE_DOUBT_M)
-    except TooWide:
-        return True
-    return False
 
 
 def _lying(place: str, request: PlanRequest) -> list[Thing]:

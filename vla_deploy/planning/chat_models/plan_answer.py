@@ -107,6 +107,8 @@ def _typed(parameter: SkillParameter, names: Names) -> Schema:
             return {"type": "number", **bounds}
         case Type.CHOICE:
             return {"type": "string", "enum": list(parameter.choices)}
+        case Type.FLAG:
+            return {"type": "boolean"}
         case Type.PLACE | Type.DEVICE as kind:
             return {"type": "string", "enum": list(names[kind])}
         case _:

@@ -9,13 +9,7 @@ from vla_deploy.ipc import SharedSpace, topics
 from vla_deploy.ipc.announcer import Announcer
 from vla_deploy.planning.dialogue.command_manager import CommandManager
 from vla_deploy.planning.dialogue.situation import Situation
-from vla_deploy.plans.battery_rules import (
-    BatteryAct,
-    RobotNow,
-    RuleState,
-    acts_on,
-    is_let_at_low,
-)
+from vla_deploy.plans.battery_rules import BatteryAct, RobotNow, RuleState, acts_on, is_let_at_low
 from vla_deploy.plans.errors import PlanError
 from vla_deploy.plans.plan import Action, Plan
 from vla_deploy.robots.battery_settings import BatterySettings

@@ -1,6 +1,6 @@
 """Read what people and programs give the planner to do; nothing of it is trusted to be whole."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any, Final
@@ -102,8 +102,10 @@ def command_id_of(event: CommandEvent) -> str:
     return str(event.payload.get("command_id", ""))[:_ID_CHARACTERS]
 
 
-def read_command(event: Event[Utterance]) -> UserCommand:
-    """Return the command that an utterance holds.
+def read_command(
+    event: Event[Utterance], read: Callable[[str], str] = lambda text: text
+) -> UserCommand:
+    """Return the command that an utterance holds; `read` puts its words as the robot knows them.
 
     Raises:
         CommandUnreadable: it holds none, or one that is too long.
@@ -111,7 +113,7 @@ def read_command(event: Event[Utterance]) -> UserCommand:
     """
     given: Mapping[str, Any] = event.payload
     plan = given.get("plan")
-    text = _words(given) if plan is None else ""
+    text = read(_words(given)) if plan is None else ""
     rest = awaiting(text)
     heard: Any = given.get("heard")
     heard = heard if isinstance(heard, Mapping) else {}
@@ -122,7 +124,9 @@ def read_command(event: Event[Utterance]) -> UserCommand:
         text=text if rest is None else rest,
         plan=plan,
         heard_confidence=_ratio(heard.get("confidence")),
-        others=tuple(islice(_others(heard.get("others")), _MOST_OTHERS)),
+        others=tuple(
+            (read(one), odds) for one, odds in islice(_others(heard.get("others")), _MOST_OTHERS)
+        ),
         is_doubted=bool(heard.get("doubted")),
         may_ask_again=bool(heard.get("ask_again")),
         is_answer=bool(given.get("answer")),

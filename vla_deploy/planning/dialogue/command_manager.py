@@ -22,11 +22,7 @@ from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.dialogue.turns import Turns
 from vla_deploy.planning.errors import CannotBeDone
 from vla_deploy.planning.interfaces import PlanningResult, PlanRequest
-from vla_deploy.planning.patterns.follow_up import (
-    asked_for,
-    corrected,
-    last_done,
-)
+from vla_deploy.planning.patterns.follow_up import asked_for, corrected, last_done
 from vla_deploy.planning.patterns.steering import (
     denies,
     is_word,

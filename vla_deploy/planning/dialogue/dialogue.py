@@ -13,11 +13,7 @@ from drivers.clock import Clock
 from vla_deploy.ipc.payloads.tasks import PlannerCounts
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
-from vla_deploy.planning.dialogue.confirmation import (
-    agreement_to,
-    confirmation_of,
-    question_about,
-)
+from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of, question_about
 from vla_deploy.planning.dialogue.event_publisher import PlannerEvents
 from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
 from vla_deploy.planning.dialogue.situation import Situation

@@ -66,6 +66,10 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "place": lambda given: f"put it {given['relation']} {_the(given['destination'])}",
     "charge": lambda given: "go and charge",
     "sweep": lambda given: f"drive over the floor of {_the(given['place'])}",
+    "inspect": lambda given: f"look at {_the(given['object'])} from two sides",
+    "guard": lambda given: (
+        f"keep watch {'at ' + _the(given['place']) if 'place' in given else 'here'}"
+    ),
     "follow_person": lambda given: "follow you",
     "hand_over": lambda given: "hand it over",
     "open_gripper": lambda given: f"open my {_hand(given)}",

@@ -91,6 +91,7 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     ("look a?round", "look", {"way": "around"}),
     (r"look(?: to the)? (?P<way>left|right|up|down|ahead)", "look", {}),
     (rf"look at {_THING}", "look", {}),
+    (rf"(?:inspect|examine) {_THING}|look at {_THING} from (?:two|both|all) sides", "inspect", {}),
     (rf"(?:find|look for|search for|locate) {_THINGS}(?: in (?:the )?(?P<from>{WORDS}))?",
      "find", {}),
     # --- hands
@@ -116,6 +117,10 @@ _ROWS: Final[tuple[tuple[str, str, Mapping[str, str]], ...]] = (
     (rf"(?:clean|tidy|clear)(?: up)?(?: {_WHERE})?", "tidy", {}),
     (rf"(?:clean|sweep|vacuum|hoover|mop) (?:the )?floor (?:of|in) {_WHERE}|"
      rf"(?:sweep|vacuum|hoover|mop)(?: up)? {_WHERE}", "sweep", {}),
+    (rf"(?:set|lay) (?:the table|(?P<where>the {WORDS} table))(?: for (?P<by>me|us|one|two))?",
+     "set", {}),
+    (rf"(?:guard|watch|(?:keep|stand) (?:watch|guard)(?: (?:at|in|over|of|on))?)"
+     rf"(?: here| (?P<where>the {WORDS}))?(?: for (?P<by>{_SECONDS}))?", "guard", {}),
     (rf"patrol {_WHERE}(?:(?:,| and|, and) (?P<then>{WORDS}))?", "patrol", {}),
     # --- say, wait, answer
     (r"say (?P<text>[^,;:]+)|(?P<text>hello|hi|good (?:morning|evening)|goodbye|bye)", "say", {}),

@@ -50,7 +50,7 @@ LONGEST_ID: Final = 48
 OTHER_FAILED: Final = "the other one could not take such a thing the last time"
 # These skills want the robot before the thing, those only want it known.
 FROM_CLOSE: Final = frozenset({"pick_up", "place"})
-OF_THINGS: Final = frozenset({"navigate_to", "look_at", *FROM_CLOSE})
+OF_THINGS: Final = frozenset({"navigate_to", "look_at", "inspect", *FROM_CLOSE})
 
 Step = tuple[str, Parameters]
 
@@ -171,11 +171,12 @@ class _Grounder:
                 yield from self._navigate(given)
             case "charge":
                 yield "charge", {"place": self._station(given.get("place"))}
-            case "sweep" if isinstance(given.get("place"), str):
-                yield "sweep", {"place": resolve_place(given["place"], self.resolver)}
+            case "sweep" | "guard" if isinstance(given.get("place"), str):
+                where = resolve_place(given["place"], self.resolver)
+                yield action.skill, {**given, "place": where}
             case "place":
                 yield from self._place(given)
-            case "find_object" | "look_at" if isinstance(given.get("object"), str):
+            case "find_object" | "look_at" | "inspect" if isinstance(given.get("object"), str):
                 thing = self.resolver.things(given["object"], ThingUse.SEE)[0]
                 yield from _on_furniture(thing)
                 yield action.skill, {**given, "object": thing.name}

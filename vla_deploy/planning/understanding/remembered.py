@@ -15,7 +15,7 @@ from vla_deploy.plans.symbolic.conditions import MET, Setting, is_known
 from vla_deploy.plans.symbolic.state import SymbolicState
 
 # What is done with a thing that must be found first.
-_OF_UNSEEN: Final = frozenset({"find_object", "look_at", "navigate_to", "pick_up"})
+_OF_UNSEEN: Final = frozenset({"find_object", "look_at", "inspect", "navigate_to", "pick_up"})
 
 
 def place_to_look(

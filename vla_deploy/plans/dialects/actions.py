@@ -162,8 +162,6 @@ def _steps(
     _describe(own)
     if POINT in own:
         _settle_point(action_id, form, own, source[POINT], findings)
-    if form.goes_first and "object" in own:
-        way = {"object": own["object"]}
     if POINT in way:
         way |= _on_floor(action_id, way.pop(POINT), source[POINT], findings)
     for key, value in given.items():  # of what has no form the validator says what is taken

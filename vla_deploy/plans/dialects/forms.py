@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from vla_deploy.plans.catalogue import RELATIONS
-from vla_deploy.plans.dialects import values
+from vla_deploy.plans.dialects import grips, values
 from vla_deploy.plans.dialects.values import NotMeant, Read, ValueReading, unused
 
 DESCRIPTOR: Final = "(descriptor)"
@@ -43,15 +43,13 @@ class ParameterForm:
 class ActionForm:
     """Say what documents call an action, its skill, and the forms of its parameters.
 
-    `default` holds what a document means that leaves it out. With `goes_first` the robot drives to
-    the thing before the skill begins.
+    `default` holds what a document means that leaves it out.
     """
 
     names: tuple[str, ...]
     skill: str
     parameters: tuple[ParameterForm, ...] = ()
     default: Mapping[str, Any] = field(default_factory=dict)
-    goes_first: bool = False
     note: str = ""
 
     def parameter(self, name: str) -> ParameterForm | None:
@@ -120,6 +118,16 @@ _TO: Final = (
     _DESCRIPTOR, _SPEED, _APPROACH, _MARGIN,
 )  # fmt: skip
 _HAND: Final = (_ARM, _ARM_SPEED, _GRASP, _CAREFUL, _FORCE, _APPROACH, _MARGIN)
+_TAKE: Final = (
+    _ARM,
+    _Form(("grasp", "grasp_type"), grips.kind_of_grasp),
+    _Form(("grasp_position",), unused("the thing is taken where it is seen")),
+    _Form(("approach_direction",), grips.way_in),
+    _Form(("careful",), grips.careful),
+    _Form(("speed_ratio", "speed"), grips.share_of_speed),
+    _Form(("force_ratio", "force"), grips.share_of_force),
+    _MARGIN,
+)
 _PUT: Final = (
     _Form((*_WAYS, "container", "surface", "target"), values.goal("destination")),
     _Form(_THING, values.thing()),
@@ -164,6 +172,8 @@ _FORMS: Final = (
                parameters=(_Form(("place", "station", "location"), values.text("place")),)),
     ActionForm(names=("follow_person", "follow"), skill="follow_person",
                parameters=(_DURATION,)),
+    ActionForm(names=("guard", "watch", "monitor"), skill="guard", parameters=(
+        _Form(("place", "area", "location", "room"), values.text("place")), _DURATION)),
     ActionForm(names=("sweep", "execute_cleaning", "cover_area"), skill="sweep", parameters=(
         _Form(("place", "area", "location", "room"), values.text("place")),
         _Form(("coverage_type",), unused("it drives in lanes, and then to what they have left")),
@@ -182,7 +192,7 @@ _FORMS: Final = (
     ActionForm(names=("turn_right",), skill="turn", default={"angle_rad": -_QUARTER_RAD},
                parameters=_turned(-1.0, "turn_left")),
     ActionForm(names=("pick_up", "pick", "grasp", "grab", "take", "grasp_object"),
-               skill="pick_up", parameters=(_OBJECT, _DESCRIPTOR, *_HAND)),
+               skill="pick_up", parameters=(_OBJECT, _DESCRIPTOR, *_TAKE)),
     ActionForm(names=("place", "place_down", "put_down", "put", "put_away", "release", "drop",
                       "navigate_to_place"),
                skill="place", parameters=_PUT),
@@ -191,8 +201,9 @@ _FORMS: Final = (
     ActionForm(names=("find_object", "detect_object", "search", "search_for_object"),
                skill="find_object", parameters=_SEARCH),
     ActionForm(names=("look_at", "look"), skill="look_at", parameters=_LOOK),
-    ActionForm(names=("inspect",), skill="look_at", goes_first=True,
-               parameters=(*_LOOK, _Form(("inspection_type",), _inspection), _APPROACH, _MARGIN)),
+    ActionForm(names=("inspect", "examine"), skill="inspect", parameters=(
+        _Form((*_THING, "target", "target_position"), values.thing()), _DESCRIPTOR,
+        _Form(("inspection_type",), _inspection), _APPROACH, _MARGIN)),
     ActionForm(names=("open_gripper",), skill="open_gripper", parameters=(_ARM, _FORCE)),
     ActionForm(names=("close_gripper",), skill="close_gripper", parameters=(_ARM, _FORCE)),
     ActionForm(names=("move_arm",), skill="move_arm",

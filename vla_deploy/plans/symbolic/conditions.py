@@ -9,7 +9,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy.manipulation.errors import TooWide
-from vla_deploy.manipulation.grasps import SIZE_DOUBT_M, grasps_from_above
+from vla_deploy.manipulation.grasps import (
+    SIZE_DOUBT_M,
+    GraspKind,
+    grasps_from_above,
+    side_grip_m,
+    side_refusal,
+)
 from vla_deploy.plans.knowledge import World, match_place
 from vla_deploy.plans.symbolic.state import Point, Subject, SymbolicState, subject_or_none
 from vla_deploy.robots.description import KeepOutZone
@@ -139,7 +145,7 @@ def is_not_held(state: SymbolicState, setting: Setting) -> Answer:
 
 
 def can_be_gripped(_: SymbolicState, setting: Setting) -> Answer:
-    """Is the thing narrow enough, and at a height, for a hand that points down?"""
+    """Is the thing narrow enough, and at a height, for a hand from above or from the side?"""
     subject, opening_m = setting.subject("object"), setting.world.opening_max_m
     if subject is None or subject.thing is None or opening_m is None:
         return None
@@ -150,8 +156,24 @@ def can_be_gripped(_: SymbolicState, setting: Setting) -> Answer:
         )
     except TooWide as error:
         return str(error)
-    reach = setting.world.reach
-    return None if reach is None else reach.height_refusal(grasps[0].point_m[2]) or MET
+    wanted, reach = setting.parameters.get("grasp"), setting.world.reach
+    not_so = not_from_side(setting.world) or side_refusal(thing.kind, thing.size_m, SIZE_DOUBT_M)
+    if wanted == GraspKind.SIDE and not_so:
+        return not_so
+    if reach is None:
+        return None
+    from_above_m = () if wanted == GraspKind.SIDE else (grasps[0].point_m[2],)
+    beside_m = thing.bottom_m + side_grip_m(thing.size_m)
+    from_side_m = () if wanted == GraspKind.TOP or not_so else (beside_m,)
+    refusals = [reach.height_refusal(height_m) for height_m in (*from_above_m, *from_side_m)]
+    return MET if "" in refusals else refusals[0]
+
+
+def not_from_side(world: World) -> str:
+    """Return why the robot grasps nothing from the side, "" where it does."""
+    return (
+        "" if world.takes_from_side else "from the side takes an arm of six joints; mine has less"
+    )
 
 
 def is_light_enough(_: SymbolicState, setting: Setting) -> Answer:

@@ -60,8 +60,13 @@ def turns(state: SymbolicState, setting: Setting) -> SymbolicState:
     return replace(state, at="", pose=(x_m, y_m, yaw_rad))
 
 
+def keeps_watch(state: SymbolicState, setting: Setting) -> SymbolicState:
+    """Stand at the place that is guarded, or where the robot is."""
+    return goes(state, setting) if setting.place("place") is not None else state
+
+
 def strays(state: SymbolicState, _: Setting) -> SymbolicState:
-    """Stand wherever somebody has led."""
+    """Stand wherever somebody, or the work, has led."""
     return replace(state, at="", spot=None, pose=None)
 
 
@@ -150,6 +155,15 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
             effect=moves,
         ),
         "follow_person": Logic(needs={}, effect=strays),
+        "guard": Logic(needs={"area allowed": conditions.may_go_there}, effect=keeps_watch),
+        "inspect": Logic(
+            needs={
+                KNOWN: conditions.is_known,
+                "not held": conditions.is_not_held,
+                "area allowed": conditions.may_go_there,
+            },
+            effect=strays,
+        ),
         "sweep": Logic(needs={"area allowed": conditions.may_go_there}, effect=strays),
         "turn": Logic(needs={}, effect=turns),
         "look_at": Logic(needs={KNOWN: conditions.is_known}),

@@ -1,6 +1,7 @@
 """Find an object: in memory, on the furniture in view, then from each viewpoint of the home.
 
-Where it was last comes first, what was looked at just now comes last, between them what is near.
+Where it was last comes first, then what was not looked at lately, the nearest first. An action
+looks from each viewpoint once, also when it is tried again, and tells which it did not get to.
 """
 
 import math
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vla_deploy.client.place_state import PlaceState
 from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.robots.floor_pose import Pose2D
@@ -26,13 +28,16 @@ from vla_deploy.skills.movements.gaze import (
     turn_head,
     watch_for,
 )
+from vla_deploy.skills.movements.looked import (
+    SURELY_SEEN_M,
+    furniture_of,
+    staleness,
+    viewpoint_names,
+)
 from vla_deploy.world import Query
 from vla_deploy.world.memory import where_to_look
-from vla_deploy.world.surfaces import FURNITURE_AHEAD_M
 
-FURNITURE_HEIGHT_M = 0.5
-# Within the first distance everything on furniture is recognised, within the second large things.
-SURELY_SEEN_M = 1.5
+# Within it large things on furniture are recognised.
 PERHAPS_SEEN_M = 2.9
 NECK_RANGE_RAD = 1.7
 # A way that is not much longer than the line of sight leads around no wall.
@@ -41,6 +46,7 @@ DETOUR_RATIO, DETOUR_M = 1.3, 0.6
 ON_FURNITURE_M = 0.7
 # In so short a time nobody has put anything there.
 JUST_SEEN_S = 30.0
+LOOKED_AT, NOT_REACHED = "looked_at", "not_reached"
 GLANCE = (0.0, 0.55)
 # Where the eyes sweep at a viewpoint, as (pan, tilt).
 SWEEP = ((0.0, 0.85), (0.65, 0.65), (-0.65, 0.65))
@@ -65,7 +71,12 @@ def _search(context: SkillContext, query: Query) -> Skill:
     """Look around, then from one viewpoint after the other, until the object is in the scene."""
     places = context.robot.places
     shut = {view for name in context.keeps_out & places.keys() for view in places[name].viewpoints}
-    left = {view: None for one in places.values() for view in one.viewpoints if view not in shut}
+    done = _told(context, LOOKED_AT)
+    left = {
+        view: None
+        for view, name in viewpoint_names(context).items()
+        if view not in shut and name not in done
+    }
     if shut:
         yield from speak(context, {"text": f"I leave out the {_left_out(context)}."})
     yield from _look_around(context, query, left)
@@ -87,10 +98,11 @@ def _look_around(context: SkillContext, query: Query, left: dict[Pose2D, None]) 
             return
         if _is_just_seen(context, viewpoint):
             continue
-        yield from gaze_at(context, _furniture_of(viewpoint))
+        yield from gaze_at(context, furniture_of(viewpoint))
         yield from watch_for(context, query)
         if distance_m < SURELY_SEEN_M:
             del left[viewpoint]
+            _tell(context, LOOKED_AT, viewpoint)
 
 
 def _search_from(context: SkillContext, viewpoint: Pose2D, query: Query) -> Skill:
@@ -101,8 +113,13 @@ def _search_from(context: SkillContext, viewpoint: Pose2D, query: Query) -> Skil
         yield from drive_to(
             context, viewpoint, until=lambda: remembered(context, query) is not None
         )
-    except NotPossible:
+    except (NotPossible, TryAgain):
+        if context.link.place_state is PlaceState.LOST:
+            raise
+        _tell(context, NOT_REACHED, viewpoint)
         return  # a viewpoint that cannot be reached now leaves the others to try
+    if remembered(context, query) is None:
+        _tell(context, LOOKED_AT, viewpoint)
     yield from _sweep(context, query, SWEEP)
 
 
@@ -122,7 +139,7 @@ def _in_sight(
     """Return the viewpoints whose furniture can be seen from here, with its distance."""
     seen = []
     for viewpoint in viewpoints:
-        x_m, y_m, _ = to_base(context.link.pose, _furniture_of(viewpoint))
+        x_m, y_m, _ = to_base(context.link.pose, furniture_of(viewpoint))
         distance_m, bearing_rad = math.hypot(x_m, y_m), math.atan2(y_m, x_m)
         if distance_m > PERHAPS_SEEN_M or abs(bearing_rad) > NECK_RANGE_RAD:
             continue
@@ -131,11 +148,12 @@ def _in_sight(
     return seen
 
 
-def _rank(context: SkillContext, query: Query, viewpoint: Pose2D) -> tuple[bool, bool, float]:
+def _rank(context: SkillContext, query: Query, viewpoint: Pose2D) -> tuple[bool, bool, int, float]:
     """Return what to search by, the least first."""
     return (
         not _was_there(context, query, viewpoint),
         _is_just_seen(context, viewpoint),
+        staleness(context, viewpoint),
         _way_m(context, viewpoint),
     )
 
@@ -155,7 +173,7 @@ def _was_there(context: SkillContext, query: Query, viewpoint: Pose2D) -> bool:
 
 def _is_just_seen(context: SkillContext, viewpoint: Pose2D) -> bool:
     """Return whether things on a viewpoint's furniture, near by, were seen a moment ago."""
-    x_m, y_m, _ = to_base(context.link.pose, _furniture_of(viewpoint))
+    x_m, y_m, _ = to_base(context.link.pose, furniture_of(viewpoint))
     scene = context.link.snapshot() if math.hypot(x_m, y_m) < SURELY_SEEN_M else None
     return scene is not None and any(
         scene.unseen_s(one) < JUST_SEEN_S and not one.held_by and _is_on(one.xy_m, viewpoint)
@@ -164,12 +182,7 @@ def _is_just_seen(context: SkillContext, viewpoint: Pose2D) -> bool:
 
 
 def _is_on(xy_m: tuple[float, float], viewpoint: Pose2D) -> bool:
-    return math.dist(xy_m, _furniture_of(viewpoint)[:2]) < ON_FURNITURE_M
-
-
-def _furniture_of(viewpoint: Pose2D) -> tuple[float, float, float]:
-    """Return the point of the map, on the furniture, that a viewpoint looks at."""
-    return (*viewpoint.outward(FURNITURE_AHEAD_M, 0.0), FURNITURE_HEIGHT_M)
+    return math.dist(xy_m, furniture_of(viewpoint)[:2]) < ON_FURNITURE_M
 
 
 def _way_m(context: SkillContext, goal: Pose2D) -> float:
@@ -179,6 +192,19 @@ def _way_m(context: SkillContext, goal: Pose2D) -> float:
     except NavigationError:
         return math.inf
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _tell(context: SkillContext, key: str, viewpoint: Pose2D) -> None:
+    """Have the result tell what became of a viewpoint."""
+    name = viewpoint_names(context)[viewpoint]
+    rest = [one for one in _told(context, NOT_REACHED) if one != name]
+    context.tell(**{NOT_REACHED: rest})
+    context.tell(**{key: [*_told(context, key), name]})
+
+
+def _told(context: SkillContext, key: str) -> list[str]:
+    """Return the viewpoints of which the acting action has told so, in earlier tries, too."""
+    return list(context.data.get(context.link.acting, {}).get(key, ()))
 
 
 def _left_out(context: SkillContext) -> str:
@@ -193,4 +219,10 @@ def _nowhere(context: SkillContext, query: Query) -> str:
     other = "another" if shut else "a"
     beyond = ", and one is out of my reach" if shut else ""
     told = f"I cannot find {other} {query}{beyond}; I have seen: "
-    return f"{told}{', '.join(seen) or 'nothing'}{left_out}"
+    looked = {"looked at": LOOKED_AT, "could not get to": NOT_REACHED}
+    where = [
+        f"; I {words}: {', '.join(names)}"
+        for words, key in looked.items()
+        if (names := _told(context, key))
+    ]
+    return f"{told}{', '.join(seen) or 'nothing'}{left_out}{''.join(where)}"

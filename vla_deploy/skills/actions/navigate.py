@@ -43,7 +43,9 @@ def _go(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         return
     yield from turn_head(context, *DRIVING_GAZE)
     if "place" in parameters:
-        yield from drive_to(context, _place(context, parameters["place"]), speed_m_s=speed_m_s)
+        yield from drive_to(
+            context, pose_of_place(context, parameters["place"]), speed_m_s=speed_m_s
+        )
         return
     yaw_rad = parameters.get("yaw_rad")
     goal = Pose2D(
@@ -71,10 +73,7 @@ def reach(
     known = remembered(context, query)
     if known is None:
         raise TryAgain(f"I have not seen a {query}; look for it first")
-    scene = context.link.snapshot() if context.keeps_out else None
-    for place in () if scene is None else scene.below(known["id"]):
-        if place in context.keeps_out:
-            raise NotPossible(f"the {query} is at the {spoken(place)}, where I was told not to go")
+    refuse_kept_out(context, query, known["id"])
     if not context.robot.finds_its_way:
         if anew or not context.robot.reach.has(to_base(context.link.pose, known["position_m"])):
             why = "and I cannot drive" if context.robot.parts.base is None else _NO_WAY
@@ -91,6 +90,18 @@ def reach(
     why = reasons[0] if reasons else "walls or furniture stand around it"
     context.out_of_reach[known["id"]] = context.link.clock.now_ns()
     raise NotPossible(f"I cannot get within reach of the {query}: {why}")
+
+
+def refuse_kept_out(context: SkillContext, query: Query, thing_id: str) -> None:
+    """Refuse to go to a thing that lies where the plan keeps out of.
+
+    Raises:
+        NotPossible: it does.
+    """
+    scene = context.link.snapshot() if context.keeps_out else None
+    for place in () if scene is None else scene.below(thing_id):
+        if place in context.keeps_out:
+            raise NotPossible(f"the {query} is at the {spoken(place)}, where I was told not to go")
 
 
 def solve_near(context: SkillContext, query: Query, solve: Callable[[], T]) -> Solving[T]:
@@ -130,7 +141,12 @@ def _full_hands(context: SkillContext) -> tuple[str, ...]:
     return tuple(sorted(hand for hand, held in context.hands.items() if held is not None))
 
 
-def _place(context: SkillContext, name: str) -> Pose2D:
+def pose_of_place(context: SkillContext, name: str) -> Pose2D:
+    """Return where one stands for a place.
+
+    Raises:
+        NotPossible: there is no such place.
+    """
     place = match_place(name, spoken_places(context.robot.places))
     if place is None:
         known = ", ".join(sorted(context.robot.places))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
-from vla_deploy.manipulation.grasps import hand_down, raised
+from vla_deploy.manipulation.grasps import HAND_ABOVE_SUPPORT_M, Grasp, drawn_back, hand_at, raised
 from vla_deploy.plans.errors import UnknownObject
 from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.actions.navigate import solve_near
@@ -19,14 +19,17 @@ from vla_deploy.skills.movements.arms import (
     believe_fingers,
     feel_way,
     lift,
+    move_straight,
     move_to_posture,
     opening_of,
     set_opening,
 )
-from vla_deploy.skills.movements.carrying import RESTARTS, carry, or_carry
+from vla_deploy.skills.movements.carrying import RESTARTS, carry, empty_targets, or_carry
 from vla_deploy.skills.movements.frames import to_base
 from vla_deploy.skills.movements.gaze import kept_in_sight, turn_head, watch
 from vla_deploy.skills.movements.motion import pause
+from vla_deploy.skills.movements.neighbours import MARGIN_M, crowding_m
+from vla_deploy.skills.movements.self_clearance import is_clear_of_self
 from vla_deploy.skills.movements.surfaces import Spot, free_spots, spots_beside
 from vla_deploy.skills.movements.swing import heights_above
 from vla_deploy.world import Query
@@ -47,6 +50,9 @@ LOST_OPENING_M = 0.012
 LOOK_AT_TABLE = (0.0, 0.85)
 LET_GO_M = 0.03
 ABOVE_SPEED_RATIO = 0.5
+OUT_SPEED_RATIO = 0.35
+# A hand that lies draws its tips out of what it held, and so far again.
+CLEAR_OF_HELD_M = 0.03
 # What stands so much early has come down: things are seen and held to a few centimetres. What was
 # only felt may reach down much farther than was taken for granted.
 EARLY_M, EARLY_UNKNOWN_M = 0.04, 0.10
@@ -55,11 +61,17 @@ UNKNOWN = "object"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Release:
-    """Hold where the grip lets go, in the base frame, and the joint positions above it."""
+    """Hold where the grip lets go, in the base frame, and the joint positions above it.
+
+    After that the hand goes up by `above_m`, one that lies by way of `out`, behind what it held:
+    `postures` are those at the corners of its way.
+    """
 
     grip: NDArray[np.float64]
     above: NDArray[np.float64]
     above_m: float
+    out: NDArray[np.float64] | None
+    postures: tuple[NDArray[np.float64], ...] = ()
 
 
 def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
@@ -92,6 +104,8 @@ def _put_down(context: SkillContext, hand: str, held: Held, release: Release) ->
     yield from set_opening(context, hand, held.width_m + LET_GO_M)
     context.hands[hand] = None
     yield from pause(context, 0.3)
+    if release.out is not None:
+        yield from move_straight(context, hand, release.out, OUT_SPEED_RATIO)
     yield from lift(context, hand, release.above_m)
 
 
@@ -185,7 +199,7 @@ def _over_object(
         raise NotPossible(f"a {seen['class']} is no container; put things in a {known}")
     lower_m = below_rim_m(context, seen, held) if relation == IN else -ABOVE_SURFACE_M
     point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
-    return _solve_above(context, hand, point_m, held, lower_m + CLEAR_OF_RIM_M)
+    return _solve_above(context, hand, point_m, held, lower_m + CLEAR_OF_RIM_M, seen["id"])
 
 
 def below_rim_m(context: SkillContext, container: Mapping[str, Any], held: Held) -> float:
@@ -193,7 +207,11 @@ def below_rim_m(context: SkillContext, container: Mapping[str, Any], held: Held)
     spare_m = float(container["size_m"][2]) - max(
         ABOVE_FLOOR_M, _filled_m(context, container, held)
     )
-    return min(max(spare_m, BELOW_RIM_M), DEEP_BELOW_RIM_M)
+    below_m = min(max(spare_m, BELOW_RIM_M), DEEP_BELOW_RIM_M)
+    if held.tilt_rad == 0.0:
+        return below_m
+    # A hand that lies stays above the rim.
+    return max(min(below_m, held.below_grip_m - HAND_ABOVE_SUPPORT_M), -ABOVE_SURFACE_M)
 
 
 def _filled_m(context: SkillContext, container: Mapping[str, Any], held: Held) -> float:
@@ -218,41 +236,95 @@ def _solve_above(
     release_m: tuple[float, float, float],
     held: Held,
     least_m: float = 0.0,
+    onto: str = "",
 ) -> Release:
     """Return the posture above a release point that moves the arm least and can descend.
 
-    It is at least `least_m` above it: what is held swings in over the rim of a container.
+    What was taken from the side is put down as it was taken. The posture is at least `least_m`
+    above it: what is held swings in over the rim of a container. `onto` is the id of what it is put
+    in or on: nothing else may be where a hand that lies comes down.
 
     Raises:
         OutOfReach: no yaw of the hand gets there.
     """
     now, reasons = context.link.setpoints, [""]
     aside_m = context.robot.hands[hand].middle_m(held.width_m)
-    grips = [hand_down(release_m, yaw_rad, aside_m) for yaw_rad in YAWS_RAD]
+    grips = [
+        hand_at(release_m, yaw_rad, held.tilt_rad, aside_m)
+        for yaw_rad in YAWS_RAD
+        if held.tilt_rad == 0.0 or _has_room(context, hand, release_m, yaw_rad, held, onto)
+    ]
+    if not grips:
+        reasons.append("what stands around leaves no room for a hand that lies")
     least_m = max(context.robot.reach.above_m, least_m)
     for above_m in heights_above(context, release_m, held.below_grip_m, least_m):
         found = [
-            Release(grip=grip, above=above, above_m=above_m)
+            release
             for grip in grips
-            if (above := _descent(context, hand, grip, above_m, reasons)) is not None
+            if (release := _descent(context, hand, grip, above_m, held, reasons)) is not None
         ]
-        if found:
-            return min(found, key=lambda one: float(np.abs(one.above - now).max()))
+        for release in sorted(found, key=lambda one: float(np.abs(one.above - now).max())):
+            if not release.postures or _comes_home(context, hand, held, release):
+                return release
+            reasons.append("the arm would come too near to the robot itself")
     x_m, y_m, z_m = release_m
     raise OutOfReach(
         f"the {hand} hand cannot reach {x_m:.2f}, {y_m:.2f}, {z_m:.2f} m: {reasons[-1]}"
     )
 
 
+def _has_room(
+    context: SkillContext,
+    hand: str,
+    release_m: tuple[float, float, float],
+    yaw_rad: float,
+    held: Held,
+    onto: str,
+) -> bool:
+    """Return whether a hand that lies comes down to a release, and away, beside what stands."""
+    own = next((one["id"] for one in context.link.objects if one.get("held_by") == hand), "")
+    grasp = Grasp(
+        point_m=release_m,
+        yaw_rad=yaw_rad,
+        width_m=held.width_m,
+        opening_m=held.width_m + LET_GO_M,
+        effort_ratio=0.0,
+        below_grip_m=held.below_grip_m,
+        tilt_rad=held.tilt_rad,
+        way_in_m=held.width_m / 2 + CLEAR_OF_HELD_M,
+    )
+    return crowding_m(context, grasp, {"id": own, "rests": {"of": onto}}) <= MARGIN_M
+
+
+def _comes_home(context: SkillContext, hand: str, held: Held, release: Release) -> bool:
+    """Return whether a hand that lies gets to a release and then to where it travels empty."""
+    home = release.postures[-1].copy()
+    for name, position in empty_targets(context, hand).items():
+        home[context.robot.joint_index[name]] = position
+    way = [context.link.setpoints, *release.postures, home]
+    return is_clear_of_self(context, hand, way, held.width_m + LET_GO_M)
+
+
 def _descent(
-    context: SkillContext, hand: str, grip: NDArray[np.float64], above_m: float, reasons: list[str]
-) -> NDArray[np.float64] | None:
-    """Return a posture above a grip from which the hand can go straight down to it."""
-    arm = context.arms[hand]
+    context: SkillContext,
+    hand: str,
+    grip: NDArray[np.float64],
+    above_m: float,
+    held: Held,
+    reasons: list[str],
+) -> Release | None:
+    """Return how the hand gets straight down to a grip and away from it."""
+    arm, out = context.arms[hand], None
+    corners: tuple[NDArray[np.float64], ...] = ()
     try:
         above = arm.solve(raised(grip, above_m), context.link.setpoints, restarts=RESTARTS)
-        arm.straight_line(above.positions, grip)
+        at_grip = arm.straight_line(above.positions, grip)[-1]
+        if held.tilt_rad != 0.0:
+            out = drawn_back(grip, held.width_m / 2 + CLEAR_OF_HELD_M)
+            outside = arm.straight_line(at_grip, out)[-1]
+            raised_up = arm.straight_line(outside, raised(out, above_m))[-1]
+            corners = (above.positions, at_grip, outside, raised_up)
     except ManipulationError as error:
         reasons.append(str(error))
         return None
-    return above.positions
+    return Release(grip=grip, above=above.positions, above_m=above_m, out=out, postures=corners)

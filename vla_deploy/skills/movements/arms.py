@@ -168,17 +168,18 @@ def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: fl
     yield from _along(context, hand, target, speed_ratio, None)
 
 
-def feel_way(context: SkillContext, hand: str, target: Any) -> Skill:
+def feel_way(context: SkillContext, hand: str, target: Any, speed_ratio: float = 1.0) -> Skill:
     """Move a hand slowly along a straight line until it is there, or meets something.
 
-    A robot whose file has no limits of contact feels nothing on its way.
+    `speed_ratio` is a share of the usual slow speed. A robot whose file has no limits of contact
+    feels nothing on its way.
 
     Raises:
         OutOfReach: the arm cannot follow the line.
         Touched: the arm has met something on it, and rests there.
     """
     try:
-        yield from _along(context, hand, target, FEELING_SPEED_RATIO, TOUCH_RATIO)
+        yield from _along(context, hand, target, speed_ratio * FEELING_SPEED_RATIO, TOUCH_RATIO)
     except Touched:
         yield from settle(context, arm_joints(context, hand))
         raise

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from vla_deploy.manipulation.errors import ManipulationError
-from vla_deploy.manipulation.grasps import hand_down
+from vla_deploy.manipulation.grasps import hand_at
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.movements.arms import arm_joints, arm_targets, lift
+from vla_deploy.skills.movements.frames import side_of
 from vla_deploy.skills.movements.motion import move_joints, settle
 from vla_deploy.skills.movements.underside import leave_underside
 
@@ -18,8 +19,13 @@ LOADED_SPEED_RATIO, EMPTY_SPEED_RATIO = 0.6, 0.85
 FOLDING_STEPS = 12
 HOLD_OUT_HEIGHTS = 5
 CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30))
+# Of a hand that lies, from straight ahead outwards: its wrist is before the chest, and what it
+# holds before its shoulder. Inwards its elbow would stand out or its wrist meet the chest.
+LYING_HEADINGS_RAD = tuple(math.radians(degrees) for degrees in (30, 60, 90))
 # One yaw out of reach is no loss: another is tried at once.
 RESTARTS = 2
+# Of a hand that lies there are few yaws to choose from.
+LYING_RESTARTS = 10
 Point = tuple[float, float, float]
 
 
@@ -73,7 +79,7 @@ def _fold_up(context: SkillContext, hand: str, clear_height_m: float) -> Skill:
     An arm that sank without power lies so twisted that it follows no straight line; with all of
     its joints at once its hand would sweep over what stands there.
     """
-    targets = _empty_targets(context, hand)
+    targets = empty_targets(context, hand)
     ways = {joint: _way_to(context, hand, joint, target) for joint, target in targets.items()}
     joint, way = max(ways.items(), key=lambda item: max(item[1]))
     enough = (one for one in way if one[0] >= clear_height_m)
@@ -99,10 +105,10 @@ def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:
     point_m = context.robot.hands[hand].carry_point_m
     if context.hands.get(hand) is not None and point_m is not None:
         return _carry_targets(context, hand, point_m)
-    return _empty_targets(context, hand)
+    return empty_targets(context, hand)
 
 
-def _empty_targets(context: SkillContext, hand: str) -> dict[str, float]:
+def empty_targets(context: SkillContext, hand: str) -> dict[str, float]:
     """Return where the arm of an empty hand travels; one of no such pose stays where it is."""
     pose, joints = context.robot.hands[hand].travel_pose, arm_joints(context, hand)
     if pose is None:
@@ -112,26 +118,40 @@ def _empty_targets(context: SkillContext, hand: str) -> dict[str, float]:
 
 def _carry_targets(context: SkillContext, hand: str, point_m: Point) -> dict[str, float]:
     """Return the carry posture nearest to the present one."""
-    targets = _down_at(context, hand, point_m)
+    targets = _upright_at(context, hand, point_m)
     if targets is None:
         raise NotPossible(f"the {hand} hand cannot reach its carry point {point_m}")
     return targets
 
 
-def _down_at(context: SkillContext, hand: str, point_m: Point) -> dict[str, float] | None:
-    """Return the nearest posture in which a hand points down at a point, None out of its reach."""
+def _upright_at(context: SkillContext, hand: str, point_m: Point) -> dict[str, float] | None:
+    """Return the nearest posture in which a hand has what it holds upright at a point.
+
+    That is a hand that points down, unless it took the thing from the side. None out of its reach.
+    """
     arm = context.arms[hand]
     now = context.link.setpoints
+    held = context.hands.get(hand)
+    tilt_rad = 0.0 if held is None else held.tilt_rad
+    restarts = RESTARTS if tilt_rad == 0.0 else LYING_RESTARTS
     found = []
-    for yaw_rad in CARRY_YAWS_RAD:
+    for yaw_rad in _carry_yaws_rad(context, hand, tilt_rad):
+        target = hand_at(point_m, yaw_rad, tilt_rad)
         try:
-            found.append(arm.solve(hand_down(point_m, yaw_rad), now, restarts=RESTARTS).positions)
+            found.append(arm.solve(target, now, restarts=restarts).positions)
         except ManipulationError:
             continue  # not every yaw is within the wrist's range
     if not found:
         return None
     best = min(found, key=lambda positions: float(np.abs(positions - now).max()))
     return arm_targets(context, hand, best)
+
+
+def _carry_yaws_rad(context: SkillContext, hand: str, tilt_rad: float) -> tuple[float, ...]:
+    if tilt_rad == 0.0:
+        return CARRY_YAWS_RAD
+    side, over_rad = side_of(context, hand), math.pi if tilt_rad < 0.0 else 0.0
+    return tuple(side * heading_rad + over_rad for heading_rad in LYING_HEADINGS_RAD)
 
 
 def hold_out(context: SkillContext, hand: str) -> Skill:
@@ -141,7 +161,7 @@ def hold_out(context: SkillContext, hand: str) -> Skill:
         NotPossible: it gets nowhere within the reach of the robot file.
     """
     for point_m in _points_out(context, hand):
-        targets = _down_at(context, hand, point_m)
+        targets = _upright_at(context, hand, point_m)
         if targets is not None:
             yield from move_joints(context, targets, LOADED_SPEED_RATIO)
             return

@@ -106,14 +106,19 @@ class Detour:
         return f", {away_m[nearest]:.1f} m from the {spoken(nearest)}"
 
 
-def _ahead(way: Points, pose: Pose2D) -> Points:
-    """Return points on what is left of a way, from the nearest to the robot on, up to LOOK_M."""
+def samples_of(way: Points) -> Points:
+    """Return points along a way, STRIDE_M apart and its corners among them."""
     samples = [way[:1]]
     for first, second in itertools.pairwise(way):
         count = max(1, math.ceil(math.dist(first, second) / STRIDE_M))
         shares = np.arange(1, count + 1)[:, None] / count
         samples.append(first + shares * (second - first))
-    points = np.vstack(samples)
+    return np.vstack(samples)
+
+
+def _ahead(way: Points, pose: Pose2D) -> Points:
+    """Return points on what is left of a way, from the nearest to the robot on, up to LOOK_M."""
+    points = samples_of(way)
     nearest = int(np.argmin(np.hypot(*(points - (pose.x_m, pose.y_m)).T)))
     return points[nearest : nearest + round(LOOK_M / STRIDE_M)]
 

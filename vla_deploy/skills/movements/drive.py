@@ -161,7 +161,7 @@ def follow(
             pose = context.link.pose
             if detour.revise(pose):
                 context.way_m = detour.way
-                follower = PathFollower(detour.way, limits, final_yaw_rad)
+                follower.take_up(detour.way)
             twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
             hindrance = detour.closed_by or hindrance_of(
                 context, twist, _distance(pose, points[-1])

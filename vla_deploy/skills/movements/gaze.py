@@ -8,8 +8,9 @@ from typing import Any
 from drivers.clock import NS_PER_S
 from vla_deploy.plans.knowledge import parse_object
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.errors import NotPossible, NotThere, TryAgain
 from vla_deploy.skills.movements.frames import to_base
+from vla_deploy.skills.movements.looked import note_looked
 from vla_deploy.skills.movements.motion import move_joints, settle, wait_until
 from vla_deploy.world import Query, Viewpoint, read_snapshot
 
@@ -45,6 +46,7 @@ def look_at(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         if context.robot.parts.head is None:
             raise NotPossible("my camera stands fast: I have no head to turn")
         yield from turn_head(context, *DIRECTIONS[parameters["direction"]])
+        note_looked(context)
         return
     query = parse_object(parameters["object"])
     target = remembered(context, query)
@@ -119,7 +121,8 @@ def see(context: SkillContext, query: Query) -> Skill:
     """Look at an object until it has been seen afresh; read it with `remembered` afterwards.
 
     Raises:
-        TryAgain: it is not where it was.
+        NotThere: it is not where it was.
+        TryAgain: it has not been seen.
     """
     known = remembered(context, query)
     if known is None:
@@ -138,7 +141,7 @@ def see(context: SkillContext, query: Query) -> Skill:
 
     yield from wait_until(context, fresh, FRESH_TIMEOUT_S)
     if not fresh():
-        raise TryAgain(f"the {query} is no longer where I saw it")
+        raise NotThere(f"the {query} is no longer where I saw it")
 
 
 def watch(context: SkillContext) -> Skill:
@@ -154,6 +157,7 @@ def watch_for(context: SkillContext, query: Query) -> Skill:
     yield from wait_until(
         context, lambda: looked() or remembered(context, query) is not None, WATCH_TIMEOUT_S
     )
+    note_looked(context)
 
 
 def _looked(context: SkillContext, since_ns: int) -> bool:

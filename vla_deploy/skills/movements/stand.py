@@ -27,7 +27,7 @@ def standing_poses(
     for stand in stands_around(position_m, context.planner.is_free, reach):
         goal = _facing(context, stand)
         further_m = stand.reach_m - reach.distances_m[0]
-        candidates.append((_effort(pose, goal) + 2.0 * further_m, stand, goal))
+        candidates.append((effort(pose, goal) + 2.0 * further_m, stand, goal))
     return [goal for _, _, goal in sorted(candidates, key=lambda one: (one[0], one[1].step))][:6]
 
 
@@ -43,8 +43,8 @@ def _side_m(context: SkillContext) -> float:
     return -SIDE_M if held == ["right"] else SIDE_M
 
 
-def _effort(pose: Pose2D, goal: Pose2D) -> float:
-    """Estimate the way in metres; a radian of turning counts as a third of a metre."""
+def effort(pose: Pose2D, goal: Pose2D) -> float:
+    """Return an estimate of the way in metres; a radian of turning counts as a third of a metre."""
     heading = math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m)
     turning = abs(wrap_angle(heading - pose.yaw_rad)) + abs(wrap_angle(goal.yaw_rad - heading))
     return pose.distance_m(goal) + turning / 3.0

@@ -65,7 +65,7 @@ def test_a_prompt_has_no_more_characters_than_it_may_and_keeps_what_is_named(cro
 
 
 def test_recollections_are_cut_first_and_the_oldest_words_before_the_newest(crowded):
-    situation, _ = parts(chat_for(crowded, "butler", 11_800))
+    situation, _ = parts(chat_for(crowded, "butler", 12_200))
     assert situation["remembered"] == []
     assert situation["said_before"][0]["person"].startswith("command 4")
     small, _ = parts(chat_for(crowded, "butler", 6_000))

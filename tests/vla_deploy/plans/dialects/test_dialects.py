@@ -194,8 +194,9 @@ def test_actions_without_dependencies_come_one_after_the_other(
 
 
 def test_what_comes_first_of_an_action_takes_over_what_it_waits_for() -> None:
-    inspect = {"id": "b", "action": "inspect", "params": {"object": "box"}, "priority": 7}
-    plan = parse_plan([{"id": "b_navigate_to", "action": "stop"}, inspect, {"action": "stop"}])
+    where = {"object": "box", "search_area": "kitchen"}
+    search = {"id": "b", "action": "find_object", "params": where, "priority": 7}
+    plan = parse_plan([{"id": "b_navigate_to", "action": "stop"}, search, {"action": "stop"}])
     assert [(one.id, one.depends_on, one.priority) for one in plan.actions] == [
         ("b_navigate_to", (), 2),
         ("b_navigate_to_2", ("b_navigate_to",), 7),

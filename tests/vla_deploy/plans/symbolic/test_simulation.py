@@ -162,6 +162,37 @@ def test_each_broken_rule_is_named_with_action_and_value(
     assert broken in found[0]
 
 
+@pytest.mark.parametrize(
+    ("robot", "size_m", "bottom_m", "grasp", "why"),
+    [
+        ("butler", (0.06, 0.06, 0.18), 0.75, {}, ""),
+        ("butler", (0.06, 0.06, 0.18), 0.75, {"grasp": "side"}, ""),
+        ("butler", (0.06, 0.06, 0.18), 0.75, {"grasp": "top"}, "0.88 m"),
+        ("butler", (0.06, 0.06, 0.18), 0.80, {}, "0.93 m"),
+        ("butler", (0.06, 0.06, 0.06), 0.5, {"grasp": "side"}, "60 mm high"),
+        ("so101", (0.04, 0.04, 0.1), 0.0, {"grasp": "side"}, "takes an arm of six joints"),
+    ],
+)
+def test_what_is_too_high_from_above_is_taken_from_the_side_if_it_stands_and_is_round(
+    robot: str,
+    size_m: tuple[float, float, float],
+    bottom_m: float,
+    grasp: dict[str, str],
+    why: str,
+) -> None:
+    position_m = (2.0, 1.5, bottom_m + size_m[2] / 2)
+    bottle = thing("bottle_1", size_m=size_m, position_m=position_m)
+    found = faults(
+        world_of(load_robot(robot), EMPTY),
+        ("navigate_to", {"object": "bottle_1"}),
+        ("pick_up", {"object": "bottle_1", **grasp}),
+        scene=seen(bottle),
+    )
+    graspable = [one for one in found if "graspable" in one]
+    assert len(graspable) == bool(why)
+    assert why in "".join(graspable)
+
+
 def test_a_third_thing_needs_a_third_hand(butler: World) -> None:
     scene = seen(thing("cup_1"), thing("ball_1", 2.2), thing("can_1", 2.4))
     (fault,) = faults(

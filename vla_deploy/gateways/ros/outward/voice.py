@@ -110,10 +110,10 @@ _INTENTS: Final = frozenset(
 )
 _BY_SKILL: Final = {
     **dict.fromkeys(
-        ("navigate_to", "charge", "follow_person", "sweep", "move", "turn"), "navigation"
+        ("navigate_to", "charge", "follow_person", "guard", "sweep", "move", "turn"), "navigation"
     ),
     **dict.fromkeys(("pick_up", "place", "open_gripper", "close_gripper"), "manipulation"),
-    **dict.fromkeys(("find_object", "look_at"), "search"),
+    **dict.fromkeys(("find_object", "look_at", "inspect"), "search"),
     **dict.fromkeys(("speak", "hand_over", "wait", "turn_on", "turn_off"), "assist"),
     "stop": "stop",
 }
