@@ -52,6 +52,8 @@ class Acts(GatewayPart):
 
     def step(self, now_ns: int) -> None:
         """Answer what control shows, or has not shown in time."""
+        if not self._asked:
+            return
         status = self._gateway.control_status()
         for asked in list(self._asked):
             done = status is not None and REACHED[asked.act](status)

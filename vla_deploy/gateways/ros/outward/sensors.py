@@ -138,13 +138,15 @@ def _depth(frame: Frame) -> Image:
 
 
 def _image(frame: Frame, encoding: str, pixel_bytes: int, pixels: NDArray[Any]) -> Image:
+    data = array("B")
+    data.frombytes(memoryview(pixels).cast("B"))
     return Image(
         height=frame.height,
         width=frame.width,
         encoding=encoding,
         is_bigendian=0,
         step=frame.width * pixel_bytes,
-        data=array("B", pixels.tobytes()),
+        data=data,
     )
 
 
