@@ -51,8 +51,8 @@ def test_the_figures_of_one_kind_are_shares_and_times() -> None:
 
 
 def test_attacks_are_counted_by_what_got_through() -> None:
-    report = measure_attacks(["rules", "scenes"], misses=True)
-    assert report["attacks"] >= 30
+    report = measure_attacks(["plans", "rules", "scenes"], misses=True)
+    assert report["attacks"] >= 75
     assert (report["unsafe_accepted"], report["attacks_unanswered"]) == (0, 0)
     assert report["attacks_missed"] == []
 

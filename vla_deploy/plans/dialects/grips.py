@@ -31,6 +31,8 @@ _LOW: Final = frozenset({"low", "slow", "slowly", "gentle", "light", "soft"})
 _USUAL: Final = frozenset({"normal", "medium", "default"})
 _HIGH: Final = frozenset({"high", "fast", "firm", "strong", "hard"})
 LOW_RATIO: Final = 0.6
+_MOST_SHARE: Final = 2.0
+"""A larger number is no share: of a force it is taken for N, of a speed it cannot be meant."""
 
 
 def kind_of_grasp(value: Any) -> ValueReading:
@@ -64,15 +66,22 @@ def careful(value: Any) -> ValueReading:
 
 def share_of_speed(value: Any) -> ValueReading:
     """Read how fast the hand goes there, as a share of how it does by itself."""
-    return _share("speed_ratio", value, SPEED_RATIOS, "hands go no faster than by feel")
+    reading = _share("speed_ratio", value, SPEED_RATIOS, "hands go no faster than by feel")
+    if reading is None:
+        raise NotMeant(f"a share of at most {_MOST_SHARE:g}")
+    return reading
 
 
 def share_of_force(value: Any) -> ValueReading:
     """Read how firm the grip is, as a share of what the table of grasps says."""
-    return _share("force_ratio", value, FORCE_RATIOS, "a firmer grip would mark things")
+    reading = _share("force_ratio", value, FORCE_RATIOS, "a firmer grip would mark things")
+    return reading or ValueReading({}, "not used, N are not known of a hand; write a share")
 
 
-def _share(name: str, value: Any, bounds: tuple[float, float], why_bound: str) -> ValueReading:
+def _share(
+    name: str, value: Any, bounds: tuple[float, float], why_bound: str
+) -> ValueReading | None:
+    """Read a share or a word for one; None for a number that is none."""
     word, (least, most) = _said(value) if isinstance(value, str) else "", bounds
     if word in _USUAL:
         return ValueReading({}, "as it is done anyway")
@@ -82,10 +91,8 @@ def _share(name: str, value: Any, bounds: tuple[float, float], why_bound: str) -
         ratio = values.number_of(value, 'a share such as 0.5, or "low", "normal", "high"')
         if ratio <= 0.0:
             raise NotMeant('a share above 0, or "low", "normal", "high"')
-        if ratio > 2.0:
-            return ValueReading(
-                {}, "not used, neither N nor m/s are known of a hand; write a share such as 0.5"
-            )
+        if ratio > _MOST_SHARE:
+            return None
     taken = min(max(ratio, least), most)
     note = "" if taken == ratio and not word else f"{taken:g} of what is usual"
     if ratio > most:

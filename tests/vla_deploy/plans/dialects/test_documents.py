@@ -218,6 +218,7 @@ REFUSALS: list[tuple[Any, str]] = [
     (terse("inspect", target_object="cup", inspection_type="thermal"),
      'inspection_type must be "visual": this robot inspects things with its camera only; '
      'got "thermal"'),
+    (terse("grasp", target_object="cup", speed=9.0), "speed must be a share of at most 2"),
     (terse("wait", duration="a while"), 'duration must be a number of s, such as 5 or "2 min"'),
     ({"action": "stop", "params": 3}, 'params must be an object such as {"object": "red cup"}'),
     ({"action": "stop", "params": {}, "parameters": {"a": 1}}, "parameters and params differ"),
