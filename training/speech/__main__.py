@@ -33,7 +33,7 @@ def main() -> None:
         description=__doc__,
         epilog="example: nice python -m training.speech all --minutes 180 --out /data/speech",
     )
-    parser.add_argument("step", choices=[*STEPS, "ship", "all"])
+    parser.add_argument("step", choices=[*STEPS, *OTHERS, "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for clips and models")
     parser.add_argument("--size", choices=SIZES, default="full")
     parser.add_argument(
@@ -59,7 +59,7 @@ def main() -> None:
         budget_s=60.0 * given.minutes,
         start_from=given.start_from,
     )
-    {**STEPS, "ship": _ship}[given.step](job)
+    {**STEPS, **OTHERS}[given.step](job)
 
 
 # What a step needs beyond numpy is imported by that step alone.
@@ -90,6 +90,14 @@ def _judge(job: Job) -> None:
     judge(job.out, job.size)
 
 
+def _mean(job: Job) -> None:
+    from training.speech.training import take_mean
+
+    if job.start_from is None:
+        sys.exit("mean: expected --start-from EARLIER, got none: with what it is the mean")
+    take_mean(job.out, job.start_from)
+
+
 def _ship(job: Job) -> None:
     from training.speech.shipping import ship
 
@@ -102,7 +110,9 @@ STEPS: Final[dict[str, Callable[[Job], None]]] = {
     "export": _export,
     "judge": _judge,
 }
-"""What `all` does, in this order; shipping is a decision of its own."""
+"""What `all` does, in this order."""
+OTHERS: Final[dict[str, Callable[[Job], None]]] = {"mean": _mean, "ship": _ship}
+"""Each a decision of its own; after `mean`, between training and export, nothing else changes."""
 
 if __name__ == "__main__":
     main()

@@ -6,6 +6,7 @@ from string import Template
 from typing import Any, Final
 
 from training.speech.sizes import TrainingSize
+from training.voices import kokoro
 from training.voices.cast import (
     ACCENTS,
     HELD_OUT_ACCENT,
@@ -16,18 +17,25 @@ from training.voices.cast import (
 )
 
 METRICS: Final = "metrics.json"
+TRAINING: Final = "training.json"
+"""What a training cost."""
 TEMPLATE: Final = Path(__file__).with_name("card_template.md")
 AIMS: Final = {
     "wer_held_out_voices": 0.02,
     "wer_held_out_voices_10db": 0.05,
     "wer_unseen_engine": 0.10,
+    "wer_judged_styles": 0.05,
+    "wer_judged_styles_10db": 0.10,
 }
 TITLES: Final = {
     "known_voices": "eSpeak, voices of training",
     "known_flite": "flite, voices of training",
     "held_out_voices": "eSpeak, voices never heard",
     "unseen_engine": "festival, an engine never heard",
+    "held_styles": "Kokoro, six styles never heard",
+    "judged_styles": "Kokoro, five styles never heard, by which nothing was chosen",
 }
+_FEW: Final = 8
 
 
 def verdict(metrics: dict[str, Any]) -> str:
@@ -56,15 +64,18 @@ def card(metrics: dict[str, Any], model: Path, size: TrainingSize) -> str:
         "variants": len(VARIANTS) + len(ROBOTIC_VARIANTS),
         "held_out_accent": HELD_OUT_ACCENT,
         "held_out_variants": ", ".join(HELD_OUT_VARIANTS),
+        "held_styles": ", ".join(kokoro.DEVELOPMENT),
+        "judged_styles": ", ".join(kokoro.JUDGED),
         "clips": training["clips"],
         "packaged": ", ".join(
-            f"{engine} ({', '.join(names)})" for engine, names in PACKAGED_VOICES.items()
+            f"{engine} ({_listed(tuple(dict.fromkeys(names)))})"
+            for engine, names in PACKAGED_VOICES.items()
         ),
         "heard_h": f"{training['heard_s'] / 3600:.0f}",
         "steps": training["steps"],
         "minutes": f"{training['budget_s'] / 60:.0f}",
         "seed": training["seed"],
-        "went_on": went_on(training["heard_before_s"]),
+        "went_on": went_on(training["heard_before_s"], training.get("is_mean", False)),
         "start_from": " --start-from THE-ONE-SHIPPED-BEFORE" * (training["heard_before_s"] > 0.0),
         "name": size.name,
         "sentences": metrics["sentences"],
@@ -83,13 +94,15 @@ def card(metrics: dict[str, Any], model: Path, size: TrainingSize) -> str:
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
 
 
-def went_on(heard_before_s: float) -> str:
+def went_on(heard_before_s: float, is_mean: bool = False) -> str:
     """Return what the training began with."""
     if not heard_before_s:
         return "It began with weights at random."
     return (
         "It began with the weights of the recogniser that was shipped before it, which had heard "
         f"{heard_before_s / 3600:.0f} h."
+        + is_mean
+        * " Its weights are the mean of both (step `mean`, with the same --start-from)."
     )
 
 
@@ -111,9 +124,14 @@ def table(metrics: dict[str, Any]) -> str:
 
 def voices(metrics: dict[str, Any]) -> str:
     """Return error rates of the voices that training never heard, one by one."""
-    told = {**metrics["by_voice_held_out_voices"], **metrics["by_voice_unseen_engine"]}
+    names = ("held_out_voices", "unseen_engine", "held_styles", "judged_styles")
+    told = {who: told for name in names for who, told in metrics[f"by_voice_{name}"].items()}
     listed = ", ".join(f"{voice} {_share(ratio)}" for voice, ratio in told.items())
     return f"By voice, quiet: {listed}."
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names) if len(names) <= _FEW else f"{len(names)} voices"
 
 
 def _share(ratio: float | None) -> str:

@@ -12,11 +12,13 @@ from training.speech.trials import (
     by_foreigners,
     by_held_out_voices,
     by_known_voices,
+    by_styles,
     by_unseen_engine,
     heard,
     noises_alone,
     sentences,
 )
+from training.voices import kokoro
 from training.voices.clip import SpokenClip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.recogniser import Recogniser
@@ -85,7 +87,10 @@ _SETS: Final[dict[str, Callable[[Sequence[str], np.random.Generator], list[Spoke
     "known_flite": lambda texts, random: by_known_voices(texts, random, 1.0),
     "held_out_voices": by_held_out_voices,
     "unseen_engine": by_unseen_engine,
+    "held_styles": lambda texts, random: by_styles(texts, random, kokoro.DEVELOPMENT),
+    "judged_styles": lambda texts, random: by_styles(texts, random, kokoro.JUDGED),
 }
+"""Nothing is chosen by the judged styles; what is shipped is, by the held ones among others."""
 
 
 def _by_voice(reads: Sequence[Read]) -> dict[str, float]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.speech import calibration, judging
-from training.speech.card import METRICS, card, read_metrics
+from training.speech.card import METRICS, TRAINING, card, read_metrics
 from training.speech.sizes import TrainingSize
 from training.speech.trials import sentences
 from training.voices.clip_store import shards
@@ -28,6 +28,12 @@ LEAST_CONFIDENCE: Final = _SPEECH.least_confidence
 _SUMMARY: Final = "Spoken commands in the English of synthetic voices; never heard a person"
 _CALIBRATION_CLIPS: Final = 300
 _OTHER_SOUNDS: Final = 66
+_CHOSEN_BY: Final = tuple(
+    f"wer_{name}{noise}"
+    for name in ("held_out_voices", "unseen_engine", "held_styles")
+    for noise in ("", "_10db")
+)
+"""Word error rates over voices that were never heard, quiet and in noise."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -56,7 +62,7 @@ def _measure(recogniser: Recogniser, out: Path, size: TrainingSize) -> dict[str,
     seed = size.seed + 1
     figures, reads = judging.word_errors(recogniser, 1000, seed)
     others = judging.other_sounds(recogniser, LEAST_CONFIDENCE, _OTHER_SOUNDS, seed)
-    training = json.loads((out / "training.json").read_text(encoding="utf-8"))
+    training = json.loads((out / TRAINING).read_text(encoding="utf-8"))
     return {
         **figures,
         "sureness": judging.sureness(recogniser, reads, LEAST_CONFIDENCE),
@@ -91,19 +97,20 @@ def ship(out: Path, place: Path = SHIPPED) -> bool:
         FileNotFoundError: it is not complete.
     """
     folder = out / MODEL
-    new = _errors(read_metrics(folder / METRICS))
-    old = _errors(read_metrics(place / METRICS)) if (place / METRICS).exists() else float("inf")
-    if new >= old:
-        _LOG.warning("not shipped: word errors %.4f, those of %s are %.4f", new, place, old)
-        return False
+    trained = read_metrics(folder / METRICS)
+    if (place / METRICS).exists():
+        shipped = read_metrics(place / METRICS)
+        names = [one for one in _CHOSEN_BY if None not in (trained.get(one), shipped.get(one))]
+        new, old = (_mean(metrics, names) for metrics in (trained, shipped))
+        if new >= old:
+            _LOG.warning("not shipped: word errors %.4f, those of %s are %.4f", new, place, old)
+            return False
     shutil.rmtree(place, ignore_errors=True)
     shutil.copytree(folder, place)
-    _LOG.info("shipped to %s: word errors %.4f, before %.4f", place, new, old)
+    _LOG.info("shipped to %s", place)
     return True
 
 
-def _errors(metrics: dict[str, Any]) -> float:
-    """Return the mean word error rate over the voices that were never heard, quiet and in noise."""
-    names = ("held_out_voices", "held_out_voices_10db", "unseen_engine", "unseen_engine_10db")
-    told = [float(metrics[f"wer_{name}"]) for name in names if metrics[f"wer_{name}"] is not None]
-    return sum(told) / len(told)
+def _mean(metrics: dict[str, Any], names: list[str]) -> float:
+    """Return the mean word error rate over the sets of which both recognisers have one."""
+    return sum(float(metrics[name]) for name in names) / len(names)

@@ -17,8 +17,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from training.mean_weights import mean_of
+from training.precision import multiplies_in_bfloat16
 from training.speech.batches import ClipPool, Maker, SpeechBatch
-from training.speech.card import METRICS, read_metrics
+from training.speech.card import METRICS, TRAINING, read_metrics
 from training.speech.clips.framing import IGNORED
 from training.speech.clips.sentences import draw_sentence
 from training.speech.clips.spoiling import Spoiler
@@ -130,7 +132,7 @@ class _Run:
         self._heard_before_s = _heard_by(folder)
         if self._steps:
             return
-        path = folder / "model.bin"
+        path = _model(folder)
         for optimiser in self._optimisers:
             for group in optimiser.param_groups:
                 group["highest"] *= STARTED_RATIO
@@ -230,8 +232,32 @@ class _Run:
             "heard_before_s": self._heard_before_s,
             "seed": self._seed,
         }
-        (self._out / "training.json").write_text(json.dumps(told), encoding="utf-8")
+        (self._out / TRAINING).write_text(json.dumps(told), encoding="utf-8")
         _LOG.info("done: %s", told)
+
+
+def take_mean(out: Path, start_from: Path) -> None:
+    """Replace the weights under `out` by the mean of them and those that they began with.
+
+    A short training on other voices forgets some of the old ones; the mean has learnt most and
+    forgets little (Wortsman et al., "Robust fine-tuning of zero-shot models", 2022). It is taken
+    once.
+
+    Raises:
+        NotReadable: what it began with gives no weights.
+    """
+    told = json.loads((out / TRAINING).read_text(encoding="utf-8"))
+    if told.get("is_mean"):
+        _LOG.warning("%s: it is a mean already", out)
+        return
+    trained = torch.load(out / WEIGHTS, weights_only=True)
+    began = {name: torch.from_numpy(rows) for name, rows in weights_of(_model(start_from)).items()}
+    _write(trained | mean_of(began, {name: trained[name] for name in began}, 0.5), out / WEIGHTS)
+    (out / TRAINING).write_text(json.dumps(told | {"is_mean": True}), encoding="utf-8")
+
+
+def _model(folder: Path) -> Path:
+    return folder / "model.bin"
 
 
 def _heard_by(folder: Path) -> float:
@@ -243,7 +269,7 @@ def _heard_by(folder: Path) -> float:
 
 def _losses(model: RecogniserNetwork, batch: SpeechBatch) -> tuple[Tensor, Tensor, float]:
     """Return the losses of text and sounds, and the share of tokens that are right."""
-    with torch.autocast("cpu", torch.bfloat16):
+    with torch.autocast("cpu", torch.bfloat16, enabled=multiplies_in_bfloat16()):
         tokens, sounds = model(batch.frames, batch.tokens)
     targets = batch.targets.flatten()
     learnt = targets != IGNORED
@@ -258,19 +284,25 @@ def _losses(model: RecogniserNetwork, batch: SpeechBatch) -> tuple[Tensor, Tenso
 
 
 def _optimisers(model: nn.Module) -> list[torch.optim.Optimizer]:
-    """Return Muon for the layers' matrices, AdamW for all else."""
+    """Return Muon for the layers' matrices, AdamW for all else.
+
+    Muon multiplies in bfloat16: AdamW has all where that is slow.
+    """
     matrices: list[nn.Parameter] = []
     others: list[nn.Parameter] = []
     for name, value in model.named_parameters():
         if value.requires_grad:
-            (matrices if value.ndim == 2 and ".layers." in name else others).append(value)
-    muon = torch.optim.Muon(
-        [{"params": matrices, "highest": RATE_MATRICES}], lr=RATE_MATRICES, weight_decay=0.02
-    )
+            is_matrix = value.ndim == 2 and ".layers." in name and multiplies_in_bfloat16()
+            (matrices if is_matrix else others).append(value)
     adam = torch.optim.AdamW(
         [{"params": others, "highest": RATE_OTHERS}],
         lr=RATE_OTHERS, betas=(0.9, 0.98), weight_decay=0.01,
     )  # fmt: skip
+    if not matrices:
+        return [adam]
+    muon = torch.optim.Muon(
+        [{"params": matrices, "highest": RATE_MATRICES}], lr=RATE_MATRICES, weight_decay=0.02
+    )
     return [muon, adam]
 
 

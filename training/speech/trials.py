@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from training.speech.clips.sentences import HELD_OUT, draw_sentence
-from training.voices import espeak, festival
+from training.voices import espeak, festival, kokoro
 from training.voices.cast import (
     Speaker,
     draw_held_out,
@@ -55,6 +55,18 @@ def by_unseen_engine(texts: Sequence[str], random: Random) -> list[SpokenClip]:
             for number, text in enumerate(texts)
         ]
     )
+
+
+def by_styles(texts: Sequence[str], random: Random, styles: Sequence[str]) -> list[SpokenClip]:
+    """Speak every third text by styles of Kokoro in turn: a clip takes it as long as it lasts.
+
+    Raises:
+        EngineMissing: a package, the folder of styles or eSpeak NG is not installed.
+    """
+    return [
+        kokoro.speak(text, styles[number % len(styles)], draw_style(random))
+        for number, text in enumerate(texts[::3])
+    ]
 
 
 def by_foreigners(count: int, random: Random) -> list[SpokenClip]:

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from training.voices import espeak, flite, hibari, pico, piper, rhvoice
+from training.voices import espeak, flite, hibari, kokoro, pico, piper
 from training.voices.clip import SpokenClip, Style
 
 ACCENTS: Final = (
@@ -45,7 +45,7 @@ _ENGINES: Final[Mapping[str, Callable[[str, str, Style], SpokenClip]]] = {
     pico.ENGINE: pico.speak,
     hibari.ENGINE: hibari.speak,
     piper.ENGINE: piper.speak,
-    rhvoice.ENGINE: rhvoice.speak,
+    kokoro.ENGINE: kokoro.speak,
 }
 
 
@@ -86,11 +86,11 @@ def draw_of_all(random: np.random.Generator) -> Speaker:
 
 
 _ENGINE_SHARES: Final = {
-    espeak.ENGINE: 0.36, flite.ENGINE: 0.18, rhvoice.ENGINE: 0.2, pico.ENGINE: 0.1,
-    hibari.ENGINE: 0.09, piper.ENGINE: 0.07,
+    kokoro.ENGINE: 0.5, espeak.ENGINE: 0.24, flite.ENGINE: 0.1, pico.ENGINE: 0.06,
+    hibari.ENGINE: 0.05, piper.ENGINE: 0.05,
 }  # fmt: skip
 PACKAGED_VOICES: Final = {
-    rhvoice.ENGINE: rhvoice.VOICES, pico.ENGINE: pico.VOICES, hibari.ENGINE: hibari.VOICES,
+    kokoro.ENGINE: kokoro.VOICES, pico.ENGINE: pico.VOICES, hibari.ENGINE: hibari.VOICES,
     piper.ENGINE: piper.VOICES,
 }  # fmt: skip
 
