@@ -139,7 +139,7 @@ def _depth(frame: Frame) -> Image:
 
 def _image(frame: Frame, encoding: str, pixel_bytes: int, pixels: NDArray[Any]) -> Image:
     data = array("B")
-    data.frombytes(memoryview(pixels).cast("B"))
+    data.frombytes(pixels.data.cast("B"))
     return Image(
         height=frame.height,
         width=frame.width,
