@@ -114,18 +114,12 @@ def told(case: CaseT, tell: Callable[[str], None]) -> CaseT:
     return case
 
 
-def crashed(name: str, error: Exception) -> CampaignCase:
-    """Return a case that failed by what it raised; its traceback goes to the error output."""
-    traceback.print_exception(error)
-    return CampaignCase(name=name, failures=(f"crashed: {type(error).__name__}: {error}",))
-
-
 def crash_is_failure(
     play: Callable[Concatenate[T, P], CampaignCase],
 ) -> Callable[Concatenate[T, P], CampaignCase]:
     """Let a case whose play raises have failed: the others are played all the same.
 
-    The case is the first argument, by its name or with one.
+    The case is the first argument, by its name or with one. The traceback goes to the error output.
     """
 
     @functools.wraps(play)
@@ -133,7 +127,9 @@ def crash_is_failure(
         try:
             return play(case, *arguments, **options)
         except Exception as error:  # whatever it is, hours of other cases must not be lost by it
-            return crashed(str(getattr(case, "name", case)), error)
+            traceback.print_exception(error)
+            why = f"crashed: {type(error).__name__}: {error}"
+            return CampaignCase(name=str(getattr(case, "name", case)), failures=(why,))
 
     return judged
 

@@ -49,9 +49,7 @@ def test_a_cup_that_is_nudged_under_the_hand_is_taken_all_the_same(stack: Lockst
         "the hand rises again"
     )
     assert stack.status()["state"] == "armed"
-    assert stack.lockstep.run_until(lambda: stack.outcome(command) is not None, 60.0)
-    outcome = stack.outcome(command)
-    assert outcome is not None
+    outcome = stack.end_of(command, 60.0)
     assert outcome["success"], outcome["error"]
     assert CUP in stack.lockstep.truth()["held"]
 

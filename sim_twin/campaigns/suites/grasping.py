@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.evidence import Watch, unwatched
-from sim_twin.campaigns.report import CampaignCase, crash_is_failure
+from sim_twin.campaigns.report import CampaignCase
 from sim_twin.harness.lockstep_stack import LockstepStack, armed_lockstep
 
 SCENE: Final = "side_grasp"
@@ -40,7 +40,6 @@ _SEEN_S: Final = 2.0
 Objects = Mapping[str, Mapping[str, Any]]
 
 
-@crash_is_failure
 def play(scene: str, seed: int, watch: Watch = unwatched) -> CampaignCase:
     """Play the scene with a seed."""
     clock, failures = MonotonicClock(), list[str]()

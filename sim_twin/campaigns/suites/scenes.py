@@ -7,7 +7,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns import demos, missions, navigation
 from sim_twin.campaigns.evidence import SceneEvidence, SceneWatch, Watch
-from sim_twin.campaigns.report import CampaignCase, crashed
+from sim_twin.campaigns.report import CampaignCase, crash_is_failure
 from sim_twin.campaigns.suites import grasping, safety, voice
 from sim_twin.campaigns.suites.report import ScoredCase
 
@@ -124,13 +124,15 @@ def scenes_of(suite: str, seeds: range) -> Iterator[SuiteScene]:
 
 def play(case: SuiteScene) -> ScoredCase:
     """Play a case and score it; of what passed no pictures are kept."""
-    suite, watch, clock = SUITES[case.suite], SceneWatch(), MonotonicClock()
+    watch, clock = SceneWatch(), MonotonicClock()
     begun_ns = clock.now_ns()
-    try:
-        played = suite.play(case.scene, case.seed, watch)
-    except Exception as error:  # the other scenes are played all the same
-        played = crashed(case.name, error)
+    played = _played(case, watch)
     return scored(case, played, watch.evidence, (clock.now_ns() - begun_ns) / NS_PER_S)
+
+
+@crash_is_failure
+def _played(case: SuiteScene, watch: SceneWatch) -> CampaignCase:
+    return SUITES[case.suite].play(case.scene, case.seed, watch)
 
 
 def scored(
